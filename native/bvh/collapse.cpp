@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bvh/collapse.h"
+
+#include <array>
+#include <stdexcept>
+#include <utility>
+
+#include "base/parallel.h"
+#include "bvh/layout.h"
+#include "bvh/leaf_first_order.h"
+
+namespace bvhlab {
+namespace {
+
+/// The dynamic programme of Ylitie et al. 2017, section 3.1. For each binary node N and j = 1..k-1 it finds the
+/// least cost C(N, j) of representing N's subtree by a forest of at most j wide trees.
+template <unsigned K>
+class DynamicProgramme {
+public:
+    DynamicProgramme(const BinaryBvh& binary, const CostModel& model)
+        : binary_(binary),
+          traversal_(float(model.traversal)),
+          intersection_(float(model.intersection)),
+          plans_(binary.children.size()) {
+        const double root_area = binary.boxes[0].half_area();
+        scale_ = root_area > 0.0 ? 1.0 / root_area : 0.0;
+    }
+
+    /// Plans `node`, whose children are planned.
+    void plan(std::uint32_t node) {
+        const auto [left, right] = binary_.children[node];
+        const Costs left_costs = costs(left), right_costs = costs(right);
+        Plan<K>& plan = plans_[node];
+        plan.size = size(left) + size(right);
+
+        // best[j] = min over i of C(left, i) + C(right, j - i), for j = 2..k.
+        Costs best;
+        best.fill(infinity);
+        std::array<std::uint8_t, K + 1> share{};
+        for (unsigned i = 1; i < K; ++i) {
+            for (unsigned j = i + 1; j <= K; ++j) {
+                const float cost = left_costs[i] + right_costs[j - i];
+                share[j] = cost < best[j] ? std::uint8_t(i) : share[j];
+                best[j] = cost < best[j] ? cost : best[j];
+            }
+        }
+
+        // One tree: a leaf of all references, or a wide node over a forest of k. A tie makes a leaf.
+        const float relative_area = area(node);
+        const float as_leaf =
+            relative_area * intersection_ * float(charged_tests(plan.size, K));
+        const float as_node = relative_area * traversal_ + best[K];
+        plan.cost[1] = as_leaf <= as_node ? as_leaf : as_node;
+        plan.left_share[1] = as_leaf <= as_node ? Plan<K>::leaf : share[K];
+        plan.node_share = share[K];
+
+        // At most j trees: j - 1 of them where more do not help.
+        for (unsigned j = 2; j < K; ++j) {
+            const bool fewer = plan.cost[j - 1] <= best[j];
+            plan.cost[j] = fewer ? plan.cost[j - 1] : best[j];
+            plan.left_share[j] = fewer ? Plan<K>::fewer : share[j];
+        }
+    }
+
+    Array<Plan<K>> take() { return std::move(plans_); }
+
+private:
+    using Costs = std::array<float, K + 1>;
+    static constexpr float infinity = std::numeric_limits<float>::infinity();
+
+    /// Area relative to the root's; 1 in a scene without area, so that leaves are still compared by tests.
+    float area(std::uint32_t node) const {
+        return scale_ > 0.0 ? float(binary_.boxes[node].half_area() * scale_) : 1.0F;
+    }
+
+    std::uint32_t size(std::uint32_t node) const {
+        return binary_.is_leaf(node) ? 1 : plans_[node].size;
+    }
+
+    Costs costs(std::uint32_t node) const {
+        if (!binary_.is_leaf(node)) return plans_[node].cost;
+        Costs costs;
+        costs.fill(area(node) * intersection_ * float(charged_tests(1, K)));
+        return costs;
+    }
+
+    const BinaryBvh& binary_;
+    float traversal_, intersection_;
+    double scale_;
+    Array<Plan<K>> plans_;
+};
+
+template <unsigned K>
+Bvh collapse_to(const BinaryBvh& binary, std::shared_ptr<const Mesh> mesh, const CostModel& model,
+                Token& token) {
+    token.begin("collapsing");
+    DynamicProgramme<K> programme(binary, model);
+    for_each_leaf_first(binary, token, [&](std::uint32_t node) { programme.plan(node); });
+    token.advance(0.5F);
+    return breadth_first_layout<K>(binary, programme.take(), std::move(mesh), token);
+}
+
+}  // namespace
+
+Bvh collapse(const BinaryBvh& binary, std::shared_ptr<const Mesh> mesh, unsigned branching,
+             const CostModel& model, Token& token) {
+    constexpr std::size_t most_references = std::size_t(1) << 28;
+    if (binary.reference_count() > most_references)
+        throw std::length_error("the tree has more than 2^28 references");
+    switch (branching) {
+        case 2: return collapse_to<2>(binary, std::move(mesh), model, token);
+        case 4: return collapse_to<4>(binary, std::move(mesh), model, token);
+        case 8: return collapse_to<8>(binary, std::move(mesh), model, token);
+        default: throw std::invalid_argument("branching must be 2, 4 or 8");
+    }
+}
+
+}  // namespace bvhlab
