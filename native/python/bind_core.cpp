@@ -1,0 +1,334 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Token, Mesh, build, Bvh, trace, builders, devices.
+#include <pybind11/stl.h>
+
+#include <stdexcept>
+
+#include "base/parallel.h"
+#include "build/builder.h"
+#include "bvh/collapse.h"
+#include "bvh/cost.h"
+#include "bvh/validate.h"
+#include "python/convert.h"
+#include "trace/trace.h"
+
+namespace bvhlab {
+namespace {
+
+/// A finished tree with what its `stats` tell.
+struct PyBvh {
+    Bvh bvh;
+    std::string builder;
+    int threads;
+    double tree_seconds, collapse_seconds;
+};
+
+// --- arguments -----------------------------------------------------------------------------------
+
+void check_device(const std::string& device) {
+    if (device != "cpu")
+        throw py::value_error("unknown device '" + device + "'; there is cpu");
+}
+
+/// Triangle indices of any integer dtype as uint32, each in range of uint32.
+Array<glm::uvec3> triangle_rows(const py::handle& argument) {
+    const py::array array = py::array::ensure(argument);
+    const char kind = array ? array.dtype().kind() : '?';
+    if (kind != 'i' && kind != 'u')
+        throw py::value_error("triangles must be an array of integers");
+    if (array.ndim() != 2 || array.shape(1) != 3)
+        throw py::value_error("triangles must have shape (T, 3)");
+    using Indices = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
+    using Unsigned = py::array_t<std::uint32_t, py::array::c_style>;
+    Array<glm::uvec3> triangles(std::size_t(array.shape(0)));
+    auto* out = reinterpret_cast<std::uint32_t*>(triangles.data());
+    if (Unsigned::check_(array)) {
+        const auto exact = Unsigned::ensure(array);
+        std::copy_n(exact.data(), exact.size(), out);
+        return triangles;
+    }
+    const auto wide = Indices::ensure(array);
+    for (py::ssize_t i = 0; i < wide.size(); ++i) {
+        if (wide.data()[i] < 0 || wide.data()[i] > 0xFFFFFFFFLL)
+            throw py::value_error("triangle " + std::to_string(i / 3) + " refers to vertex " +
+                                  std::to_string(wide.data()[i]) + ", which cannot exist");
+        out[i] = std::uint32_t(wide.data()[i]);
+    }
+    return triangles;
+}
+
+std::shared_ptr<Mesh> mesh_from_python(const py::handle& vertices, const py::handle& triangles) {
+    const FloatArray rows = float_rows(vertices, "vertices", 3);
+    const auto points = as_vectors(rows);
+    Array<glm::vec3> positions(points.begin(), points.end());
+    Array<glm::uvec3> indices = triangle_rows(triangles);
+    const py::gil_scoped_release release;
+    return std::make_shared<Mesh>(make_mesh(std::move(positions), std::move(indices)));
+}
+
+Parameters parameters_from_python(const py::dict& given) {
+    Parameters parameters;
+    for (const auto& [name, value] : given) {
+        if (!py::isinstance<py::str>(name)) throw py::value_error("params must have text keys");
+        try {
+            parameters[name.cast<std::string>()] = value.cast<double>();
+        } catch (const py::cast_error&) {
+            throw py::value_error("parameter '" + name.cast<std::string>() +
+                                  "' must be a number");
+        }
+    }
+    return parameters;
+}
+
+// --- calls ---------------------------------------------------------------------------------------
+
+std::shared_ptr<PyBvh> build(const std::shared_ptr<Mesh>& mesh, const std::string& builder_id,
+                             unsigned branching, const std::string& device, int threads,
+                             const py::dict& params, double traversal, double intersection,
+                             const std::shared_ptr<Token>& given_token) {
+    const BuilderInfo& builder = find_builder(builder_id);
+    if (branching != 2 && branching != 4 && branching != 8)
+        throw py::value_error("branching must be 2, 4 or 8, not " + std::to_string(branching));
+    check_device(device);
+    check_threads(threads);
+    if (!(traversal > 0.0 && traversal < 1e6 && intersection > 0.0 && intersection < 1e6))
+        throw py::value_error("traversal and intersection costs must be above 0 and below 1e6");
+    const Parameters parameters = check_parameters(builder, parameters_from_python(params));
+    const CostModel model{traversal, intersection};
+    const auto token = token_or_new(given_token);
+
+    const py::gil_scoped_release release;
+    auto result = std::make_shared<PyBvh>();
+    result->builder = builder_id;
+    with_threads(threads, [&] {
+        result->threads = thread_count(0);
+        const Stopwatch tree_watch;
+        const BinaryBvh binary = builder.build(*mesh, model, parameters, *token);
+        result->tree_seconds = tree_watch.seconds();
+        const Stopwatch collapse_watch;
+        result->bvh = collapse(binary, mesh, branching, model, *token);
+        result->collapse_seconds = collapse_watch.seconds();
+    });
+    return result;
+}
+
+py::dict stats(const PyBvh& self) {
+    const Bvh& bvh = self.bvh;
+    py::dict stats;
+    stats["builder"] = self.builder;
+    stats["branching"] = bvh.branching();
+    stats["nodes"] = bvh.interior_count() + bvh.leaf_count;
+    stats["interior_nodes"] = bvh.interior_count();
+    stats["leaves"] = bvh.leaf_count;
+    stats["references"] = bvh.reference_count;
+    stats["max_depth"] = bvh.max_depth;
+    stats["max_leaf_size"] = bvh.max_leaf_size;
+    stats["average_leaf_size"] = double(bvh.reference_count) / double(bvh.leaf_count);
+    stats["bytes"] = bvh.node_bytes() + bvh.leaf_bytes();
+    stats["node_bytes"] = bvh.node_bytes();
+    stats["leaf_bytes"] = bvh.leaf_bytes();
+    stats["build_seconds"] = self.tree_seconds + self.collapse_seconds;
+    stats["tree_seconds"] = self.tree_seconds;
+    stats["collapse_seconds"] = self.collapse_seconds;
+    stats["threads"] = self.threads;
+    return stats;
+}
+
+PyHits trace_rays(const PyBvh& self, const py::object& origins, const py::object& directions,
+                  const py::object& t_min, const py::object& t_max, bool any_hit, bool reorder,
+                  const std::string& device, int threads, bool count,
+                  const std::shared_ptr<Token>& given_token) {
+    check_device(device);
+    check_threads(threads);
+    const RayArguments rays(origins, directions, t_min, t_max);
+    const auto token = token_or_new(given_token);
+    Hits hits;
+    {
+        const py::gil_scoped_release release;
+        hits = trace(self.bvh, rays.batch(), {any_hit, reorder, count, threads}, *token);
+    }
+    return to_python(std::move(hits), any_hit, count);
+}
+
+py::list list_builders() {
+    py::list list;
+    for (const BuilderInfo& builder : builders()) {
+        py::list parameters;
+        for (const ParameterInfo& info : builder.parameters) {
+            py::dict parameter;
+            parameter["name"] = info.name;
+            parameter["default"] = info.default_value;
+            parameter["minimum"] = info.minimum;
+            parameter["maximum"] = info.maximum;
+            parameter["integer"] = info.integer;
+            parameter["unit"] = info.unit;
+            parameter["description"] = info.description;
+            parameter["source"] = info.source;
+            parameters.append(parameter);
+        }
+        py::dict entry;
+        entry["id"] = builder.id;
+        entry["label"] = builder.label;
+        entry["source"] = builder.source;
+        entry["parameters"] = parameters;
+        list.append(entry);
+    }
+    return list;
+}
+
+py::list list_devices() {
+    py::dict cpu;
+    cpu["id"] = "cpu";
+    cpu["name"] = std::string("native threads, ") + simd_name();
+    cpu["available"] = true;
+    cpu["reason"] = "";
+    cpu["threads"] = thread_count(0);
+    cpu["simd"] = simd_name();
+    py::dict opencl;
+    opencl["id"] = "opencl";
+    opencl["name"] = "OpenCL";
+    opencl["available"] = false;
+    opencl["reason"] = "this version has no OpenCL core yet; everything runs on the cpu device";
+    opencl["threads"] = 0;
+    opencl["simd"] = "";
+    py::list list;
+    list.append(cpu);
+    list.append(opencl);
+    return list;
+}
+
+py::dict features() {
+    py::dict features;
+#ifdef BVHLAB_WITH_EMBREE
+    features["embree"] = true;
+#else
+    features["embree"] = false;
+#endif
+#ifdef BVHLAB_WITH_OIIO
+    features["image"] = true;
+#else
+    features["image"] = false;
+#endif
+    return features;
+}
+
+// --- classes -------------------------------------------------------------------------------------
+
+void bind_token(py::module_& module) {
+    py::register_exception<Cancelled>(module, "Cancelled", PyExc_RuntimeError);
+    py::class_<Token, std::shared_ptr<Token>>(
+        module, "Token", "Progress of a long call, readable from any thread, and a way to stop it.")
+        .def(py::init<>())
+        .def("cancel", &Token::cancel, "Makes the call raise Cancelled within 0.1 s.")
+        .def_property_readonly("cancelled", &Token::cancelled)
+        .def_property_readonly("fraction", &Token::fraction, "Finished share of the stage, 0 to 1.")
+        .def_property_readonly("stage", &Token::stage);
+}
+
+void bind_mesh(py::module_& module) {
+    py::class_<Mesh, std::shared_ptr<Mesh>>(module, "Mesh", "Triangles, checked and copied once.")
+        .def(py::init(&mesh_from_python), py::arg("vertices"), py::arg("triangles"),
+             "vertices (V, 3) float32, triangles (T, 3) integers.\n\n"
+             "Raises ValueError naming the first bad vertex or triangle.")
+        .def_property_readonly(
+            "vertices",
+            [](const py::object& self) {
+                const auto& mesh = self.cast<const Mesh&>();
+                py::array_t<float> view({py::ssize_t(mesh.vertices.size()), py::ssize_t(3)},
+                                        reinterpret_cast<const float*>(mesh.vertices.data()), self);
+                view.attr("flags").attr("writeable") = false;
+                return view;
+            },
+            "(V, 3) float32, read-only.")
+        .def_property_readonly(
+            "triangles",
+            [](const py::object& self) {
+                const auto& mesh = self.cast<const Mesh&>();
+                py::array_t<std::uint32_t> view(
+                    {py::ssize_t(mesh.size()), py::ssize_t(3)},
+                    reinterpret_cast<const std::uint32_t*>(mesh.triangles.data()), self);
+                view.attr("flags").attr("writeable") = false;
+                return view;
+            },
+            "(T, 3) uint32, read-only.")
+        .def_property_readonly(
+            "bounds",
+            [](const Mesh& mesh) {
+                return to_numpy(Array<glm::vec3>{mesh.bounds.lower, mesh.bounds.upper});
+            },
+            "(2, 3) float32: lower and upper corner of all triangles.");
+}
+
+void bind_bvh(py::module_& module) {
+    py::class_<PyBvh, std::shared_ptr<PyBvh>>(module, "Bvh", "A tree ready to be traced.")
+        .def(
+            "cost",
+            [](const PyBvh& self, double traversal, double intersection) {
+                return cost(self.bvh, {traversal, intersection});
+            },
+            py::arg("traversal") = 3.0, py::arg("intersection") = 2.0,
+            "Expected cost of a ray: Eq. 2 of the paper (branching 2) or Eq. 3 (4 and 8).")
+        .def_property_readonly("stats", &stats, "Sizes, counts and build times in seconds.")
+        .def(
+            "validate",
+            [](const PyBvh& self) {
+                const py::gil_scoped_release release;
+                try {
+                    validate(self.bvh);
+                } catch (const std::logic_error& error) {
+                    throw std::runtime_error(error.what());
+                }
+            },
+            "Raises RuntimeError with the first broken invariant.")
+        .def_property_readonly("mesh",
+                               [](const PyBvh& self) {
+                                   return std::const_pointer_cast<Mesh>(self.bvh.mesh);
+                               })
+        .def_property_readonly("builder", [](const PyBvh& self) { return self.builder; })
+        .def_property_readonly("branching", [](const PyBvh& self) { return self.bvh.branching(); });
+}
+
+void bind_hits(py::module_& module) {
+    py::class_<PyHits>(module, "Hits",
+                       "Answers by ray. A miss has t = inf and triangle = 0xFFFFFFFF; the hit point "
+                       "is (1-u-v) a + u b + v c. With any_hit only `occluded` is answered.")
+        .def_readonly("t", &PyHits::t)
+        .def_readonly("u", &PyHits::u)
+        .def_readonly("v", &PyHits::v)
+        .def_readonly("triangle", &PyHits::triangle)
+        .def_readonly("occluded", &PyHits::occluded)
+        .def_readonly("node_visits", &PyHits::node_visits)
+        .def_readonly("triangle_tests", &PyHits::triangle_tests)
+        .def_readonly("key_seconds", &PyHits::key_seconds)
+        .def_readonly("sort_seconds", &PyHits::sort_seconds)
+        .def_readonly("traverse_seconds", &PyHits::traverse_seconds)
+        .def_property_readonly("seconds", [](const PyHits& hits) {
+            return hits.key_seconds + hits.sort_seconds + hits.traverse_seconds;
+        });
+}
+
+}  // namespace
+
+void bind_core(py::module_& module) {
+    bind_token(module);
+    bind_mesh(module);
+    bind_bvh(module);
+    bind_hits(module);
+    module.def("build", &build, py::arg("mesh"), py::arg("builder"), py::arg("branching") = 8,
+               py::arg("device") = "cpu", py::arg("threads") = 0, py::arg("params") = py::dict(),
+               py::arg("traversal") = 3.0, py::arg("intersection") = 2.0,
+               py::arg("token") = nullptr,
+               "Builds a tree. Raises ValueError for unknown names and values out of range, Cancelled "
+               "after token.cancel().");
+    module.def("trace", &trace_rays, py::arg("bvh"), py::arg("origins"), py::arg("directions"),
+               py::arg("t_min") = 0.0F,
+               py::arg("t_max") = std::numeric_limits<float>::infinity(),
+               py::arg("any_hit") = false, py::arg("reorder") = false, py::arg("device") = "cpu",
+               py::arg("threads") = 0, py::arg("count") = false, py::arg("token") = nullptr,
+               "Traces rays (N, 3) float32. Raises ValueError naming the first bad ray.");
+    module.def("builders", &list_builders, "The builders there are, with their parameters.");
+    module.def("devices", &list_devices, "The devices there are; `reason` says why one is left out.");
+    module.def("features", &features, "What this build of the core holds.");
+}
+
+}  // namespace bvhlab

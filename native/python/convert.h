@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <memory>
+#include <string>
+
+#include "base/token.h"
+#include "scene/mesh.h"
+#include "trace/ray.h"
+
+namespace bvhlab {
+
+namespace py = pybind11;
+
+/// Float32 or float64 array of any shape, converted to contiguous float32 if it is not already.
+using FloatArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
+
+/// An array argument as contiguous float32 of shape (N, columns); N is free where `rows` is negative.
+/// Throws ValueError naming the argument for a non-numeric dtype or another shape.
+FloatArray float_rows(const py::handle& argument, const char* name, py::ssize_t columns,
+                      py::ssize_t rows = -1);
+
+/// The rows of a (N, 3) array as vectors, without a copy; the array must outlive the span.
+std::span<const glm::vec3> as_vectors(const FloatArray& array);
+
+/// Ray arguments of every tracing function: keeps the numpy arrays alive and offers them as a batch.
+/// Throws ValueError naming the first ray that is not finite, has a zero direction, or a bad interval.
+class RayArguments {
+public:
+    RayArguments(const py::handle& origins, const py::handle& directions, const py::handle& t_min,
+                 const py::handle& t_max);
+    RayBatch batch() const;
+
+private:
+    FloatArray origins_, directions_, t_min_, t_max_;
+};
+
+/// Moves an array into numpy without a copy; the numpy array owns it.
+template <class T>
+py::array_t<T> to_numpy(Array<T>&& array) {
+    auto* owner = new Array<T>(std::move(array));
+    const py::capsule release(owner, [](void* pointer) { delete static_cast<Array<T>*>(pointer); });
+    return py::array_t<T>({py::ssize_t(owner->size())}, {py::ssize_t(sizeof(T))}, owner->data(),
+                          release);
+}
+
+/// Moves an array of vectors into numpy as (N, 3) float32 without a copy.
+py::array_t<float> to_numpy(Array<glm::vec3>&& array);
+
+/// What core.trace, core.brute_force and EmbreeScene.trace return (class `Hits` in Python).
+struct PyHits {
+    py::object t, u, v, triangle, occluded, node_visits, triangle_tests;
+    double key_seconds = 0, sort_seconds = 0, traverse_seconds = 0;
+};
+
+/// Hits as numpy arrays; the arrays that were not asked for are None.
+template <class Real>
+PyHits to_python(HitsOf<Real>&& hits, bool any_hit, bool counted) {
+    const auto give = [](bool wanted, auto&& array) -> py::object {
+        if (!wanted) return py::none();
+        return to_numpy(std::move(array));
+    };
+    PyHits result;
+    result.t = give(!any_hit, hits.t);
+    result.u = give(!any_hit, hits.u);
+    result.v = give(!any_hit, hits.v);
+    result.triangle = give(!any_hit, hits.triangle);
+    result.occluded = to_numpy(std::move(hits.occluded)).view("bool");
+    result.node_visits = give(counted, hits.node_visits);
+    result.triangle_tests = give(counted, hits.triangle_tests);
+    result.key_seconds = hits.key_seconds;
+    result.sort_seconds = hits.sort_seconds;
+    result.traverse_seconds = hits.traverse_seconds;
+    return result;
+}
+
+/// The token argument: the one given, or a fresh one for None.
+std::shared_ptr<Token> token_or_new(const std::shared_ptr<Token>& token);
+
+/// Throws ValueError unless 0 <= threads <= 4096.
+void check_threads(int threads);
+
+void bind_core(py::module_& module);       // Token, Mesh, build, Bvh, trace, builders, devices
+void bind_reference(py::module_& module);  // brute_force, embree, EmbreeScene
+void bind_render(py::module_& module);     // Camera, Light, Scene, rays, render
+void bind_image(py::module_& module);      // write_image, image_difference
+
+}  // namespace bvhlab
