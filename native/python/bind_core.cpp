@@ -15,14 +15,6 @@
 namespace bvhlab {
 namespace {
 
-/// A finished tree with what its `stats` tell.
-struct PyBvh {
-    Bvh bvh;
-    std::string builder;
-    int threads;
-    double tree_seconds, collapse_seconds;
-};
-
 // --- arguments -----------------------------------------------------------------------------------
 
 void check_device(const std::string& device) {

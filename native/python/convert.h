@@ -8,6 +8,7 @@
 #include <string>
 
 #include "base/token.h"
+#include "bvh/wide_bvh.h"
 #include "scene/mesh.h"
 #include "trace/ray.h"
 
@@ -49,6 +50,14 @@ py::array_t<T> to_numpy(Array<T>&& array) {
 
 /// Moves an array of vectors into numpy as (N, 3) float32 without a copy.
 py::array_t<float> to_numpy(Array<glm::vec3>&& array);
+
+/// A finished tree with what its `stats` tell (class `Bvh` in Python).
+struct PyBvh {
+    Bvh bvh;
+    std::string builder;
+    int threads;
+    double tree_seconds, collapse_seconds;
+};
 
 /// What core.trace, core.brute_force and EmbreeScene.trace return (class `Hits` in Python).
 struct PyHits {

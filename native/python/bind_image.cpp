@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// write_image, image_difference.
+#include <pybind11/stl.h>
+
+#include <stdexcept>
+
+#include "python/convert.h"
+
+#ifdef BVHLAB_WITH_OIIO
+#include "image/compare.h"
+#include "image/write.h"
+#endif
+
+namespace bvhlab {
+namespace {
+
+#ifdef BVHLAB_WITH_OIIO
+
+/// A picture from Python: (H, W), or (H, W, C) with 1, 3 or 4 channels.
+class Picture {
+public:
+    Picture(const py::handle& argument, const char* name)
+        : values_(float_array(argument, name)),
+          view_{values_.data(), int(values_.shape(1)), int(values_.shape(0)),
+                values_.ndim() == 3 ? int(values_.shape(2)) : 1} {}
+
+    const ImageView& view() const { return view_; }
+
+private:
+    static FloatArray float_array(const py::handle& argument, const char* name) {
+        const py::array array = py::array::ensure(argument);
+        const char kind = array ? array.dtype().kind() : '?';
+        if (kind != 'f' && kind != 'i' && kind != 'u')
+            throw py::value_error(std::string(name) + " must be an array of numbers");
+        const bool has_channels = array.ndim() == 3;
+        const py::ssize_t channels = has_channels ? array.shape(2) : 1;
+        const bool fits = (array.ndim() == 2 || has_channels) &&
+                          (channels == 1 || channels == 3 || channels == 4) && array.size() > 0;
+        if (!fits)
+            throw py::value_error(std::string(name) +
+                                  " must have shape (H, W) or (H, W, C) with C 1, 3 or 4");
+        return FloatArray::ensure(array);
+    }
+
+    FloatArray values_;
+    ImageView view_;
+};
+
+void write_picture(const py::object& path, const py::object& pixels) {
+    const auto file = py::module_::import("os").attr("fspath")(path).cast<std::string>();
+    const Picture picture(pixels, "pixels");
+    const py::gil_scoped_release release;
+    write_image(file, picture.view());
+}
+
+py::dict difference(const py::object& a, const py::object& b) {
+    const Picture first(a, "a");
+    const Picture second(b, "b");
+    const ImageDifference found = compare_images(first.view(), second.view());
+    py::dict result;
+    result["max"] = found.max;
+    result["mean"] = found.mean;
+    result["rmse"] = found.rmse;
+    result["differing_pixels"] = found.differing_pixels;
+    return result;
+}
+
+#else
+
+[[noreturn]] void refuse() {
+    throw std::runtime_error("this build of BVH Lab has no OpenImageIO: it handles no pictures");
+}
+void write_picture(const py::object&, const py::object&) {
+    refuse();
+}
+py::dict difference(const py::object&, const py::object&) {
+    refuse();
+}
+
+#endif
+
+}  // namespace
+
+void bind_image(py::module_& module) {
+    module.def("write_image", &write_picture, py::arg("path"), py::arg("pixels"),
+               R"(Write a picture, (H, W) or (H, W, 1 | 3 | 4) linear float32, top row first.
+
+The extension names the format: .exr (32-bit float, linear) or .png (8-bit sRGB, clipped to [0, 1]).
+The file is written aside and renamed. Raises ValueError for another extension or shape, RuntimeError
+with file and reason where it cannot be written.)");
+    module.def(
+        "image_difference", &difference, py::arg("a"), py::arg("b"),
+        R"(How far two pictures of one shape are apart: dict of max, mean, rmse, differing_pixels.
+
+max, mean and rmse are over all values (pixels times channels); a value that is not finite in one of them
+only is infinitely far off. Raises ValueError where the shapes differ.)");
+}
+
+}  // namespace bvhlab

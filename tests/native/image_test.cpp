@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#ifdef BVHLAB_WITH_OIIO
+
+#include <OpenImageIO/imageio.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <vector>
+
+#include "image/compare.h"
+#include "image/write.h"
+
+namespace bvhlab {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A picture as OpenImageIO reads it back.
+struct ReadBack {
+    OIIO::ImageSpec spec;
+    std::vector<float> values;
+};
+
+ReadBack read(const fs::path& path) {
+    const auto input = OIIO::ImageInput::open(path.string());
+    if (!input) throw std::runtime_error(OIIO::geterror());
+    ReadBack result{input->spec(), std::vector<float>(input->spec().image_pixels() *
+                                                      std::size_t(input->spec().nchannels))};
+    input->read_image(0, 0, 0, result.spec.nchannels, OIIO::TypeDesc::FLOAT, result.values.data());
+    return result;
+}
+
+std::string refusal(const fs::path& path, const ImageView& image) {
+    try {
+        write_image(path, image);
+    } catch (const std::exception& error) {
+        return error.what();
+    }
+    return "";
+}
+
+/// An empty folder of this test alone.
+class Image : public testing::Test {
+protected:
+    void SetUp() override {
+        const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+        folder_ = fs::path(testing::TempDir()) / (std::string("bvhlab_image_") + test->name());
+        fs::remove_all(folder_);
+        fs::create_directory(folder_);
+    }
+    void TearDown() override { fs::remove_all(folder_); }
+
+    std::size_t file_count() const {
+        return std::size_t(std::distance(fs::directory_iterator(folder_), {}));
+    }
+
+    fs::path folder_;
+    const std::vector<float> values_ = {0.0F, 0.25F, 1.0F,      2.5F,  -1.0F, 0.0031308F,
+                                        0.5F, 0.18F, 100000.0F, 1e-3F, 0.75F, 1.0F};
+    const ImageView view_{values_.data(), 2, 2, 3};
+};
+
+TEST_F(Image, ExrKeepsEveryBit) {
+    write_image(folder_ / "picture.exr", view_);
+    const ReadBack picture = read(folder_ / "picture.exr");
+    EXPECT_EQ(picture.spec.width, 2);
+    EXPECT_EQ(picture.spec.nchannels, 3);
+    EXPECT_EQ(picture.spec.format, OIIO::TypeDesc::FLOAT);
+    EXPECT_EQ(picture.spec.get_string_attribute("compression"), "zip");
+    EXPECT_EQ(picture.values, values_);
+    EXPECT_EQ(file_count(), 1U);
+}
+
+TEST_F(Image, PngIsClippedSrgb) {
+    write_image(folder_ / "picture.PNG", view_);
+    const ReadBack picture = read(folder_ / "picture.PNG");
+    EXPECT_EQ(picture.spec.format, OIIO::TypeDesc::UINT8);
+    // Levels of IEC 61966-2-1 for the values above.
+    const std::vector<int> expected = {0, 137, 255, 255, 0, 10, 188, 118, 255, 3, 225, 255};
+    for (std::size_t i = 0; i < expected.size(); ++i)
+        EXPECT_EQ(std::lround(picture.values[i] * 255.0F), expected[i]) << i;
+}
+
+TEST_F(Image, GreyAndAlpha) {
+    write_image(folder_ / "grey.png", {values_.data(), 4, 3, 1});
+    EXPECT_EQ(read(folder_ / "grey.png").spec.nchannels, 1);
+    write_image(folder_ / "grey.exr", {values_.data(), 4, 3, 1});
+    EXPECT_EQ(read(folder_ / "grey.exr").values, values_);
+    const std::vector<float> half_covered = {0.25F, 0.5F, 0.0F, 0.5F};
+    write_image(folder_ / "alpha.exr", {half_covered.data(), 1, 1, 4});
+    EXPECT_EQ(read(folder_ / "alpha.exr").values, half_covered);
+    write_image(folder_ / "alpha.png", {half_covered.data(), 1, 1, 4});
+    // The colour is 0.5, 1, 0 where covered; reading multiplies the levels by alpha again.
+    OIIO::ImageSpec raw;
+    raw.attribute("oiio:UnassociatedAlpha", 1);
+    const auto input = OIIO::ImageInput::open((folder_ / "alpha.png").string(), &raw);
+    std::vector<unsigned char> levels(4);
+    input->read_image(0, 0, 0, 4, OIIO::TypeDesc::UINT8, levels.data());
+    EXPECT_EQ(levels, (std::vector<unsigned char>{188, 255, 0, 128}));
+}
+
+TEST_F(Image, NotANumberIsBlackInPng) {
+    const std::vector<float> values = {std::nanf(""), std::numeric_limits<float>::infinity(), 0.5F};
+    write_image(folder_ / "picture.png", {values.data(), 1, 1, 3});
+    EXPECT_EQ(read(folder_ / "picture.png").values[0], 0.0F);
+    EXPECT_EQ(read(folder_ / "picture.png").values[1], 1.0F);
+}
+
+TEST_F(Image, ReplacesAnOldFile) {
+    std::ofstream(folder_ / "picture.exr") << "not a picture";
+    write_image(folder_ / "picture.exr", view_);
+    EXPECT_EQ(read(folder_ / "picture.exr").values, values_);
+    EXPECT_EQ(file_count(), 1U);
+}
+
+TEST_F(Image, RefusalsNameTheFileAndLeaveNothing) {
+    const std::string jpeg = (folder_ / "picture.jpg").string();
+    EXPECT_EQ(refusal(jpeg, view_),
+              "cannot write " + jpeg + ": the extension must be .exr or .png");
+    EXPECT_NE(refusal(folder_ / "picture", view_), "");
+    const fs::path absent = folder_ / "absent";
+    EXPECT_EQ(refusal(absent / "picture.exr", view_),
+              "cannot write " + (absent / "picture.exr").string() + ": there is no folder " +
+                  absent.string());
+    EXPECT_NE(refusal(folder_ / "picture.exr", {values_.data(), 2, 2, 2}), "");
+    EXPECT_NE(refusal(folder_ / "picture.exr", {values_.data(), 0, 2, 3}), "");
+    EXPECT_EQ(file_count(), 0U);
+    fs::create_directory(folder_ / "folder.png");
+    EXPECT_NE(refusal(folder_ / "folder.png", view_), "");
+    EXPECT_EQ(file_count(), 1U);
+}
+
+TEST_F(Image, FolderThatTakesNoFiles) {
+    // Even root cannot make files in /proc.
+    if (!fs::is_directory("/proc/self")) GTEST_SKIP() << "no /proc here";
+    const std::string text = refusal("/proc/self/picture.exr", view_);
+    EXPECT_EQ(text.find("cannot write /proc/self/picture.exr: "), 0U) << text;
+    const std::string png = refusal("/proc/self/picture.png", view_);
+    EXPECT_EQ(png.find("cannot write /proc/self/picture.png: "), 0U) << png;
+}
+
+TEST_F(Image, DifferenceOfEqualPictures) {
+    const ImageDifference same = compare_images(view_, view_);
+    EXPECT_EQ(same.max, 0.0);
+    EXPECT_EQ(same.mean, 0.0);
+    EXPECT_EQ(same.rmse, 0.0);
+    EXPECT_EQ(same.differing_pixels, 0U);
+}
+
+TEST_F(Image, DifferenceIsCounted) {
+    std::vector<float> other = values_;
+    other[0] += 3.0F;
+    other[1] -= 4.0F;
+    other[9] = std::nextafter(other[9], 1.0F);
+    const ImageDifference found = compare_images(view_, {other.data(), 2, 2, 3});
+    EXPECT_EQ(found.max, 4.0);
+    EXPECT_NEAR(found.mean, 7.0 / 12.0, 1e-9);
+    EXPECT_NEAR(found.rmse, 5.0 / std::sqrt(12.0), 1e-9);
+    EXPECT_EQ(found.differing_pixels, 2U);
+}
+
+TEST_F(Image, NotANumberIsADifference) {
+    std::vector<float> other = values_;
+    other[4] = std::nanf("");
+    const ImageView broken{other.data(), 2, 2, 3};
+    EXPECT_EQ(compare_images(view_, broken).max, std::numeric_limits<double>::infinity());
+    EXPECT_EQ(compare_images(view_, broken).differing_pixels, 1U);
+    EXPECT_EQ(compare_images(broken, broken).differing_pixels, 0U);
+}
+
+TEST_F(Image, DifferentSizesCannotBeCompared) {
+    EXPECT_THROW(compare_images(view_, {values_.data(), 4, 1, 3}), std::invalid_argument);
+    EXPECT_THROW(compare_images(view_, {values_.data(), 4, 3, 1}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace bvhlab
+
+#endif

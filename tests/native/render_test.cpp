@@ -1,0 +1,452 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The parts of rendering, each against its closed form: sampler, camera rays, ray offset, lights.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+#include <numbers>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "meshes.h"
+#include "render/camera_rays.h"
+#include "render/light_sampling.h"
+#include "render/offset.h"
+#include "render/sample_shapes.h"
+#include "render/sampler.h"
+#include "trace/intersect.h"
+
+namespace bvhlab {
+namespace {
+
+using std::numbers::pi;
+
+// --- sampler -------------------------------------------------------------------------------------
+
+TEST(Sampler, SecondSobolDimensionFollowsItsDirectionNumbers) {
+    for (std::uint32_t index : {0U, 1U, 2U, 3U, 5U, 77U, 0x12345678U, 0xFFFFFFFFU}) {
+        std::uint32_t expected = 0, direction = 0x80000000U;
+        for (std::uint32_t bits = index; bits; bits >>= 1) {
+            if (bits & 1U) expected ^= direction;
+            direction ^= direction >> 1;
+        }
+        EXPECT_EQ(sobol_second(index), expected) << index;
+    }
+}
+
+TEST(Sampler, EveryElementaryIntervalHoldsOneOfTheFirst64Samples) {
+    for (std::uint32_t pixel : {0U, 1U, 4711U})
+        for (std::uint32_t dimension : {0U, 1U, 9U})
+            for (int columns = 1; columns <= 64; columns *= 2) {
+                const int rows = 64 / columns;
+                std::set<int> cells;
+                for (std::uint32_t sample = 0; sample < 64; ++sample) {
+                    const glm::dvec2 point = Sampler(pixel, sample, 7).pair(dimension);
+                    cells.insert(int(point.x * columns) * rows + int(point.y * rows));
+                }
+                EXPECT_EQ(cells.size(), 64U) << columns << " columns";
+            }
+}
+
+TEST(Sampler, PixelsDimensionsAndSeedsAreIndependent) {
+    const auto correlation = [](auto&& first, auto&& second) {
+        double sum = 0.0;
+        for (std::uint32_t i = 0; i < 4096; ++i) sum += (first(i) - 0.5) * (second(i) - 0.5);
+        return sum / 4096.0 * 12.0;
+    };
+    const auto base = [](std::uint32_t i) { return Sampler(i, 3, 0).pair(1).x; };
+    EXPECT_NEAR(correlation(base, base), 1.0, 0.05);
+    EXPECT_NEAR(correlation(base, [](auto i) { return Sampler(i, 3, 0).pair(1).y; }), 0, 0.06);
+    EXPECT_NEAR(correlation(base, [](auto i) { return Sampler(i, 3, 0).pair(2).x; }), 0, 0.06);
+    EXPECT_NEAR(correlation(base, [](auto i) { return Sampler(i, 3, 1).pair(1).x; }), 0, 0.06);
+    EXPECT_NEAR(correlation(base, [](auto i) { return Sampler(i + 1, 3, 0).pair(1).x; }), 0, 0.06);
+    EXPECT_NEAR(correlation(base, [](auto i) { return Sampler(i, 4, 0).pair(1).x; }), 0, 0.06);
+}
+
+TEST(SampleShapes, CosineDirectionsHaveTheirMoments) {
+    const glm::dvec3 normal = glm::normalize(glm::dvec3(0.3, -0.5, -0.8));
+    glm::dvec3 mean(0.0);
+    constexpr std::uint32_t count = 4096;
+    for (std::uint32_t i = 0; i < count; ++i) {
+        const glm::dvec3 direction = sample_cosine(normal, Sampler(0, i, 0).pair(0));
+        EXPECT_NEAR(glm::length(direction), 1.0, 1e-12);
+        EXPECT_GE(glm::dot(direction, normal), 0.0);
+        mean += direction / double(count);
+    }
+    EXPECT_NEAR(glm::length(mean - normal * (2.0 / 3.0)), 0.0, 1e-3);
+}
+
+TEST(SampleShapes, BasisIsOrthonormalEverywhere) {
+    for (const glm::dvec3& axis : {glm::dvec3(0, 0, 1), glm::dvec3(0, 0, -1), glm::dvec3(1, 0, 0),
+                                   glm::normalize(glm::dvec3(1e-9, -1e-9, -1))}) {
+        const glm::dmat3 basis = basis_about(axis);
+        EXPECT_NEAR(glm::determinant(basis), 1.0, 1e-12);
+        for (int i = 0; i < 3; ++i) EXPECT_NEAR(glm::length(basis[i]), 1.0, 1e-12);
+        EXPECT_EQ(basis[2], axis);
+    }
+}
+
+// --- camera rays ---------------------------------------------------------------------------------
+
+void expect_near(const glm::vec3& value, const glm::dvec3& expected, double tolerance = 1e-6) {
+    for (int axis = 0; axis < 3; ++axis)
+        EXPECT_NEAR(double(value[axis]), expected[axis], tolerance) << "axis " << axis;
+}
+
+TEST(CameraRays, PerspectiveCornersAreRowMajorFromTheTopLeft) {
+    Camera camera;
+    camera.left = -2.0;
+    camera.right = 2.0;
+    camera.clip_start = 0.25;
+    const Raster raster{4, 2};
+    const RayArrays rays = camera_rays(camera, raster, 0, 1, Token());
+    ASSERT_EQ(rays.origins.size(), 8U);
+    const std::array<glm::dvec3, 2> through{glm::dvec3(-1.5, 0.5, -1), glm::dvec3(1.5, -0.5, -1)};
+    expect_near(rays.directions.front(), glm::normalize(through[0]));
+    expect_near(rays.directions.back(), glm::normalize(through[1]));
+    expect_near(rays.origins.front(), 0.25 * through[0]);
+    expect_near(rays.origins.back(), 0.25 * through[1]);
+}
+
+TEST(CameraRays, OrthographicRaysAreParallelFromTheNearPlane) {
+    Camera camera;
+    camera.kind = CameraKind::orthographic;
+    camera.to_world = glm::translate(glm::dmat4(1.0), glm::dvec3(10, 20, 30));
+    camera.left = -2.0;
+    camera.right = 2.0;
+    camera.clip_start = 0.5;
+    const RayArrays rays = camera_rays(camera, {4, 2}, 0, 1, Token());
+    expect_near(rays.origins.front(), {8.5, 20.5, 29.5});
+    expect_near(rays.origins.back(), {11.5, 19.5, 29.5});
+    for (const glm::vec3& direction : rays.directions) EXPECT_EQ(direction, glm::vec3(0, 0, -1));
+}
+
+TEST(CameraRays, MatrixTurnsTheView) {
+    Camera camera;
+    camera.to_world = glm::rotate(glm::dmat4(1.0), pi / 2, glm::dvec3(1, 0, 0));
+    const RayArrays rays = camera_rays(camera, {1, 1}, 0, 1, Token());
+    expect_near(rays.directions[0], {0, 1, 0});
+}
+
+TEST(CameraRays, FurtherSamplesStayInTheirPixelAndSpreadOverIt) {
+    Camera camera;
+    camera.kind = CameraKind::orthographic;
+    camera.left = camera.bottom = 0.0;
+    camera.right = camera.top = 4.0;
+    std::set<int> cells;
+    for (std::uint32_t sample = 1; sample < 65; ++sample) {
+        const CameraRay ray = camera_ray(camera, {4, 4, 5}, 6, sample);  // third column, second row
+        EXPECT_GE(ray.origin.x, 2.0F);
+        EXPECT_LE(ray.origin.x, 3.0F);
+        EXPECT_GE(ray.origin.y, 2.0F);
+        EXPECT_LE(ray.origin.y, 3.0F);
+        cells.insert(int((ray.origin.x - 2.0F) * 4) * 4 + int((ray.origin.y - 2.0F) * 4));
+    }
+    EXPECT_EQ(cells.size(), 16U);
+}
+
+std::string camera_complaint(const Camera& camera) {
+    try {
+        check_camera(camera);
+    } catch (const std::invalid_argument& error) {
+        return error.what();
+    }
+    return "";
+}
+
+TEST(CameraRays, BadCamerasAreNamed) {
+    EXPECT_EQ(camera_complaint({}), "");
+    Camera camera;
+    camera.right = camera.left;
+    EXPECT_NE(camera_complaint(camera).find("window"), std::string::npos);
+    camera = {};
+    camera.clip_start = -1.0;
+    EXPECT_NE(camera_complaint(camera).find("clip_start"), std::string::npos);
+    camera = {};
+    camera.to_world[0] *= 2.0;
+    EXPECT_NE(camera_complaint(camera).find("scale"), std::string::npos);
+    camera = {};
+    camera.to_world[3][1] = std::nan("");
+    EXPECT_NE(camera_complaint(camera).find("to_world"), std::string::npos);
+}
+
+// --- offset --------------------------------------------------------------------------------------
+
+/// Single-precision test after Möller & Trumbore 1997, as other tracers of the same rays may use
+/// it.
+bool meets_in_float(const Triangle& triangle, const Ray& ray) {
+    const glm::vec3 side = triangle.b - triangle.a, other = triangle.c - triangle.a;
+    const glm::vec3 p = glm::cross(ray.direction, other);
+    const float inverse = 1.0F / glm::dot(side, p);
+    const glm::vec3 from = ray.origin - triangle.a;
+    const float u = glm::dot(from, p) * inverse;
+    const glm::vec3 q = glm::cross(from, side);
+    const float v = glm::dot(ray.direction, q) * inverse;
+    const float t = glm::dot(other, q) * inverse;
+    return u >= 0.0F && v >= 0.0F && u + v <= 1.0F && t > 0.0F;
+}
+
+bool meets_in_double(const Triangle& triangle, const Ray& ray) {
+    Box bounds{triangle.a, triangle.a};
+    bounds.grow(triangle.b);
+    bounds.grow(triangle.c);
+    float corners[3][3];
+    for (int axis = 0; axis < 3; ++axis) {
+        corners[0][axis] = triangle.a[axis];
+        corners[1][axis] = triangle.b[axis];
+        corners[2][axis] = triangle.c[axis];
+    }
+    float t, u, v;
+    return meets_triangle(PreparedRay(ray, bounds), corners, t, u, v);
+}
+
+/// Height over the longest side; slivers are no test for a single-precision tracer.
+double fatness(const Triangle& triangle) {
+    const glm::dvec3 a(triangle.a), b(triangle.b), c(triangle.c);
+    const double longest = std::max({glm::length(b - a), glm::length(c - b), glm::length(a - c)});
+    return glm::length(glm::cross(b - a, c - a)) / (longest * longest);
+}
+
+struct Placement {
+    float size, distance;
+};
+
+class Offset : public testing::TestWithParam<Placement> {};
+
+TEST_P(Offset, NewRaysNeverMeetTheirOwnTriangle) {
+    const auto [size, distance] = GetParam();
+    std::mt19937 random(5);
+    int in_double = 0, in_float = 0, tried = 0;
+    for (int i = 0; i < 20000; ++i) {
+        const glm::vec3 centre = test::uniform_vector(random, -distance, distance);
+        const Triangle triangle{centre + test::uniform_vector(random, -size, size),
+                                centre + test::uniform_vector(random, -size, size),
+                                centre + test::uniform_vector(random, -size, size)};
+        if (!(fatness(triangle) > 0.05)) continue;
+        double u = test::uniform(random, 0, 1), v = test::uniform(random, 0, 1);
+        if (u + v > 1.0) u = 1.0 - u, v = 1.0 - v;
+        const glm::dvec3 incoming(test::uniform_vector(random, -1, 1));
+        const SurfacePoint point = surface_point(triangle, u, v, incoming);
+        // Half of the directions graze.
+        glm::dvec3 direction(test::uniform_vector(random, -1, 1));
+        if (i % 2) direction -= 0.999 * glm::dot(direction, point.normal) * point.normal;
+        const Ray ray{offset_origin(point, direction), 0.0F, glm::vec3(direction),
+                      std::numeric_limits<float>::infinity()};
+        in_double += meets_in_double(triangle, ray) ? 1 : 0;
+        in_float += meets_in_float(triangle, ray) ? 1 : 0;
+        ++tried;
+    }
+    EXPECT_GT(tried, 10000);
+    EXPECT_EQ(in_double, 0);
+    EXPECT_EQ(in_float, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(AnyScale, Offset,
+                         testing::Values(Placement{1, 0}, Placement{1, 1e3F}, Placement{100, 1e6F},
+                                         Placement{1e-6F, 0}, Placement{1e-6F, 1e-4F},
+                                         Placement{1e6F, 1e6F}, Placement{1e4F, 1}));
+
+TEST(Offset, WithoutOffsetTrianglesDoMeetThemselves) {
+    // What the offset is for: the rounded hit point alone is often on the wrong side.
+    std::mt19937 random(5);
+    int met = 0;
+    for (int i = 0; i < 1000; ++i) {
+        const Triangle triangle{test::uniform_vector(random, 0, 10),
+                                test::uniform_vector(random, 0, 10),
+                                test::uniform_vector(random, 0, 10)};
+        SurfacePoint point = surface_point(triangle, 0.3, 0.3, {0, 0, -1});
+        point.clearance = 0.0;
+        met += meets_in_double(
+            triangle, {offset_origin(point, point.normal), 0.0F, glm::vec3(point.normal), 1e30F});
+    }
+    EXPECT_GT(met, 100);
+}
+
+TEST(Offset, NormalFacesTheViewerAndNeedlesHaveOne) {
+    const Triangle triangle{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    EXPECT_EQ(surface_point(triangle, 0.2, 0.2, {0, 0, -1}).normal, glm::dvec3(0, 0, 1));
+    EXPECT_EQ(surface_point(triangle, 0.2, 0.2, {0, 0, 1}).normal, glm::dvec3(0, 0, -1));
+    const Triangle needle{{0, 0, 0}, {1, 1, 1}, {2, 2, 2}};
+    EXPECT_EQ(surface_point(needle, 0.2, 0.2, {0, 0, 2}).normal, glm::dvec3(0, 0, -1));
+}
+
+// --- lights --------------------------------------------------------------------------------------
+
+constexpr std::uint32_t light_samples = 1 << 14;
+
+/// Irradiance at the origin on a surface with this normal, averaged over samples.
+double irradiance(const Light& light, const glm::dvec3& normal) {
+    double sum = 0.0;
+    for (std::uint32_t i = 0; i < light_samples; ++i) {
+        const LightSample sample = sample_lamp(light, glm::dvec3(0.0), Sampler(0, i, 0).pair(0));
+        const double cosine = glm::dot(normal, glm::normalize(sample.to_light));
+        sum += sample.irradiance.x * std::max(0.0, cosine);
+    }
+    return sum / light_samples;
+}
+
+/// Irradiance of a polygon of radiance 1 (Lambert): half the sum of the angles under which its
+/// edges are seen, each times the cosine of its plane. Corners counter-clockwise as seen from the
+/// origin.
+double polygon_irradiance(const std::vector<glm::dvec3>& corners, const glm::dvec3& normal) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+        const glm::dvec3 from = glm::normalize(corners[i]);
+        const glm::dvec3 to = glm::normalize(corners[(i + 1) % corners.size()]);
+        sum +=
+            std::acos(glm::dot(from, to)) * glm::dot(normal, glm::normalize(glm::cross(from, to)));
+    }
+    return std::abs(0.5 * sum);
+}
+
+Light lamp(LightKind kind, double power, const glm::dvec3& place) {
+    Light light;
+    light.kind = kind;
+    light.to_world = glm::translate(glm::dmat4(1.0), place);
+    light.color = glm::vec3(float(power));
+    return light;
+}
+
+const glm::dvec3 up(0, 0, 1);
+
+TEST(Lights, PointFollowsTheInverseSquare) {
+    const Light light = lamp(LightKind::point, 100, {0, 3, 4});
+    EXPECT_NEAR(irradiance(light, up), 100 / (4 * pi) / 25 * 0.8, 1e-6);
+}
+
+TEST(Lights, PointWithRadiusIsAFacingDisk) {
+    Light light = lamp(LightKind::point, 100, {0, 0, 2});
+    light.size_x = 0.5;
+    EXPECT_NEAR(irradiance(light, up), 100 / (4 * pi) / (4 + 0.25), 1e-4);
+}
+
+TEST(Lights, SunGivesItsStrengthAtAnyAngularSize) {
+    for (double diameter : {0.0, 0.01, 0.8}) {
+        Light light = lamp(LightKind::sun, 3, {5, 6, 7});
+        light.size_x = diameter;
+        light.to_world = glm::rotate(light.to_world, 0.5, glm::dvec3(1, 0, 0));
+        EXPECT_NEAR(irradiance(light, up), 3 * std::cos(0.5), 2e-4) << diameter;
+    }
+}
+
+TEST(Lights, SpotMasksAPointLight) {
+    Light light = lamp(LightKind::spot, 100, {0, 0, 2});
+    light.spot_angle = 1.0;
+    EXPECT_NEAR(irradiance(light, up), 100 / (4 * pi) / 4, 1e-6);
+    light.to_world = glm::rotate(light.to_world, 0.49, glm::dvec3(1, 0, 0));
+    EXPECT_NEAR(irradiance(light, up), 100 / (4 * pi) / 4, 1e-6);
+    light.to_world = glm::rotate(light.to_world, 0.02, glm::dvec3(1, 0, 0));
+    EXPECT_EQ(irradiance(light, up), 0.0);
+}
+
+TEST(Lights, SpotBlendIsHalfInTheMiddleOfItsCosines) {
+    Light light = lamp(LightKind::spot, 100, {0, 0, 2});
+    light.spot_angle = 1.0;
+    light.spot_blend = 0.5;
+    const double edge = std::cos(0.5);
+    const double middle = std::acos(edge + 0.25 * (1.0 - edge));
+    light.to_world = glm::rotate(light.to_world, middle, glm::dvec3(1, 0, 0));
+    EXPECT_NEAR(irradiance(light, up), 0.5 * 100 / (4 * pi) / 4, 1e-6);
+}
+
+TEST(Lights, DiskHasItsFormFactor) {
+    Light light = lamp(LightKind::area, 100, {0, 0, 2});
+    light.shape = LightShape::disk;
+    light.size_x = light.size_y = 3.0;  // of diameter
+    const double radiance = 100 / (pi * pi * 2.25);
+    EXPECT_NEAR(irradiance(light, up), pi * radiance * 2.25 / (2.25 + 4), 5e-3);
+}
+
+TEST(Lights, RectangleHasItsFormFactorAndShinesForwardOnly) {
+    Light light = lamp(LightKind::area, 100, {0.5, 0.2, 2});
+    light.to_world = glm::rotate(light.to_world, 0.4, glm::dvec3(0, 1, 0));
+    light.size_x = 2.0;
+    light.size_y = 1.0;
+    std::vector<glm::dvec3> corners;
+    for (const glm::dvec2 place : {glm::dvec2(-1, -0.5), {1, -0.5}, {1, 0.5}, {-1, 0.5}})
+        corners.emplace_back(light.to_world * glm::dvec4(place, 0.0, 1.0));
+    const double expected = 100 / (2 * pi) * polygon_irradiance(corners, up);
+    EXPECT_NEAR(irradiance(light, up), expected, 1e-3 * expected);
+    light.to_world = glm::rotate(light.to_world, pi, glm::dvec3(0, 1, 0));
+    EXPECT_EQ(irradiance(light, up), 0.0);
+}
+
+Scene scene_of(Mesh mesh, std::vector<Material> materials, std::vector<Light> lights) {
+    Array<std::uint32_t> index(mesh.size());
+    for (std::size_t i = 0; i < index.size(); ++i) index[i] = std::uint32_t(i % materials.size());
+    return make_scene(test::shared(std::move(mesh)), std::move(materials), std::move(index),
+                      std::move(lights), glm::vec3(0.0F));
+}
+
+TEST(Lights, EmittingTrianglesHaveTheirFormFactorFromBothSides) {
+    const Mesh mesh =
+        make_mesh({{-1, -1, 2}, {1, -1, 2}, {1, 1, 2}, {-1, 1, 3}}, {{0, 1, 2}, {0, 2, 3}});
+    const Scene scene = scene_of(mesh, {{glm::vec3(0.5F), glm::vec3(2.0F)}}, {});
+    const LightSampler lights(scene);
+    ASSERT_EQ(lights.size(), 1U);
+    double sum = 0.0;
+    for (std::uint32_t i = 0; i < light_samples; ++i) {
+        const LightSample sample = lights.sample(0, glm::dvec3(0.0), Sampler(0, i, 0).pair(0));
+        sum += sample.irradiance.x * sample.to_light.z / glm::length(sample.to_light);
+    }
+    double expected = 0.0;
+    for (std::size_t i = 0; i < 2; ++i) {
+        const Triangle t = mesh.triangle(i);
+        expected +=
+            2.0 * polygon_irradiance({glm::dvec3(t.a), glm::dvec3(t.b), glm::dvec3(t.c)}, up);
+    }
+    EXPECT_NEAR(sum / light_samples, expected, 2e-3 * expected);
+}
+
+TEST(Lights, ChoiceFollowsPower) {
+    const Scene scene =
+        scene_of(test::copies(1), {Material{}},
+                 {lamp(LightKind::point, 10, {0, 0, 1}), lamp(LightKind::point, 0, {0, 0, 1}),
+                  lamp(LightKind::area, 30, {0, 0, 1})});
+    const LightSampler lights(scene);
+    double probability;
+    EXPECT_EQ(lights.choose(0.0, probability), 0U);
+    EXPECT_NEAR(probability, 0.25, 1e-12);
+    EXPECT_EQ(lights.choose(0.2499, probability), 0U);
+    EXPECT_EQ(lights.choose(0.25, probability), 2U);
+    EXPECT_NEAR(probability, 0.75, 1e-12);
+    EXPECT_EQ(lights.choose(0.99999999, probability), 2U);
+}
+
+TEST(Lights, DarkLampsAreStillChosen) {
+    const Scene scene =
+        scene_of(test::copies(1), {Material{}},
+                 {lamp(LightKind::point, 0, {0, 0, 1}), lamp(LightKind::point, 0, {0, 0, 1})});
+    double probability;
+    EXPECT_EQ(LightSampler(scene).choose(0.7, probability), 1U);
+    EXPECT_EQ(probability, 0.5);
+}
+
+TEST(Scene, BadPartsAreNamed) {
+    const auto mesh = test::shared(test::copies(3));
+    const auto complaint = [&](Material material, Array<std::uint32_t> index, Light light) {
+        try {
+            make_scene(mesh, {material}, std::move(index), {light}, glm::vec3(0.0F));
+        } catch (const std::invalid_argument& error) {
+            return std::string(error.what());
+        }
+        return std::string();
+    };
+    const Light good = lamp(LightKind::point, 1, {0, 0, 0});
+    EXPECT_EQ(complaint({}, {0, 0, 0}, good), "");
+    EXPECT_EQ(complaint({}, {0, 0, 1}, good),
+              "triangle 2 has material 1, but there are only 1 materials");
+    EXPECT_EQ(complaint({}, {0, 0}, good), "material_index has 2 entries for 3 triangles");
+    EXPECT_NE(complaint({glm::vec3(2.0F), {}}, {0, 0, 0}, good).find("material 0 has base_color"),
+              std::string::npos);
+    Light bad = good;
+    bad.color.y = -1.0F;
+    EXPECT_EQ(complaint({}, {0, 0, 0}, bad).find("light 0: the light's color"), 0U);
+}
+
+}  // namespace
+}  // namespace bvhlab
