@@ -18,7 +18,8 @@ struct Cancelled : std::exception {
 class Token {
 public:
     Token() = default;
-    /// For one part of a longer call: cancelled with `whole`, which must outlive it; progress is its own.
+    /// For one part of a longer call: cancelled with `whole`, which must outlive it; progress is
+    /// its own.
     explicit Token(const Token* whole) : whole_(whole) {}
 
     /// Names the stage that begins; `stage` must be a string literal.

@@ -67,11 +67,13 @@ BinaryBvh build_lbvh(const Mesh& mesh, Token& token) {
     const std::size_t count = mesh.size();
 
     // Sort the triangles along the Morton curve.
+    Array<Box> boxes(count);
     Array<std::uint64_t> codes(count);
     BinaryBvh bvh = BinaryBvh::with_references(count);
     const MortonGrid grid(mesh.bounds);
     parallel_for_each(count, 4096, token, [&](std::size_t i) {
-        codes[i] = grid.code(mesh.box(i));
+        boxes[i] = mesh.box(i);
+        codes[i] = grid.code(boxes[i]);
         bvh.references[i] = std::uint32_t(i);
     });
     token.advance(0.2F);
@@ -80,7 +82,7 @@ BinaryBvh build_lbvh(const Mesh& mesh, Token& token) {
 
     // Build the tree over the sorted order.
     parallel_for_each(count, 4096, token, [&](std::size_t i) {
-        bvh.boxes[bvh.first_leaf() + i] = mesh.box(bvh.references[i]);
+        bvh.boxes[bvh.first_leaf() + i] = boxes[bvh.references[i]];
     });
     SubtreeBuilder{codes, bvh, token}.build(0, 0, std::uint32_t(count - 1));
     token.advance(1.0F);

@@ -9,6 +9,7 @@
 #include "build/chunks.h"
 #include "build/clip.h"
 #include "build/radix_sort.h"
+#include "build/running_box.h"
 
 namespace bvhlab {
 namespace {
@@ -21,13 +22,6 @@ std::uint32_t ordered_bits(float value) {
     return bits & 0x80000000U ? ~bits : bits | 0x80000000U;
 }
 
-double half_area(const Box& box) {
-    const double x = double(box.upper.x) - double(box.lower.x);
-    const double y = double(box.upper.y) - double(box.lower.y);
-    const double z = double(box.upper.z) - double(box.lower.z);
-    return x * y + y * z + z * x;
-}
-
 bool all_centres_equal(const ReferenceView& node) {
     for (int axis = 0; axis < 3; ++axis) {
         const Order order = node.orders[std::size_t(axis)];
@@ -38,10 +32,20 @@ bool all_centres_equal(const ReferenceView& node) {
     return true;
 }
 
+/// Asks for the reference that a pass over an order needs a little later: large nodes exceed the caches.
+void prefetch(const Reference* references, Order order, std::size_t i) {
+    if (i < order.size()) __builtin_prefetch(references + order[i]);
+}
+
+constexpr std::size_t prefetch_distance = 16;
+
 Box box_of(std::span<const Reference> references, Order order) {
-    Box box = Box::empty();
-    for (const std::uint32_t position : order) box.grow(references[position].box);
-    return box;
+    RunningBox box(Box::empty());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+        prefetch(references.data(), order, i + prefetch_distance);
+        box.grow(references[order[i]]);
+    }
+    return box.box();
 }
 
 /// The rule of find_object_split: whether `a` is to be taken rather than `b`.
@@ -67,26 +71,30 @@ void sweep(const ReferenceView& node, int axis, const Stretch& stretch, ObjectSp
     const Reference* references = node.references.data();
     const std::size_t count = node.size();
 
-    // Backwards: areas of the right sides.
-    double right_areas[chunk_size];
-    Box right = stretch.after;
-    for (std::size_t i = stretch.end; i > stretch.begin; --i) {
-        if (i < count) right_areas[i - 1 - stretch.begin] = half_area(right);
-        right.grow(references[order[i - 1]].box);
+    // Backwards: costs of the right sides, down to where these alone are too much.
+    double right_costs[chunk_size];  // at i: of what comes behind reference stretch.begin + i
+    RunningBox right(stretch.after);
+    std::size_t first = stretch.end;
+    if (first == count) right.grow(references[order[--first]]);
+    for (; first > stretch.begin; --first) {
+        const double cost = right.half_area() * double(count - first);
+        if (cost > best.cost) break;
+        right_costs[first - 1 - stretch.begin] = cost;
+        prefetch(references, order, first - 1 - prefetch_distance);
+        right.grow(references[order[first - 1]]);
     }
 
-    // Forwards: areas of the left sides. Their share of the cost only grows.
-    Box left = stretch.before;
+    // Forwards: left sides, up to where these alone are too much.
+    RunningBox left(stretch.before);
     const std::size_t last = std::min(stretch.end, count - 1);
     for (std::size_t i = stretch.begin; i < last; ++i) {
-        left.grow(references[order[i]].box);
-        const std::size_t left_size = i + 1;
-        const double left_cost = half_area(left) * double(left_size);
+        left.grow(references[order[i]]);
+        if (i < first) continue;
+        const double left_cost = left.half_area() * double(i + 1);
         if (left_cost > best.cost) return;
-        const double cost =
-            left_cost + right_areas[i - stretch.begin] * double(count - left_size);
+        const double cost = left_cost + right_costs[i - stretch.begin];
         if (cost > best.cost) continue;
-        const ObjectSplit split{cost, axis, left_size};
+        const ObjectSplit split{cost, axis, i + 1};
         if (is_better(split, best, count)) best = split;
     }
 }
@@ -118,7 +126,7 @@ ObjectSplit sweep_large(const ReferenceView& node, const Token& token) {
             after.grow(box);
         }
 
-        std::vector<ObjectSplit> splits(chunks);
+        std::vector<ObjectSplit> splits(chunks, best);
         for_chunks(count, token, [&](std::size_t begin, std::size_t) {
             const std::size_t chunk = begin / chunk_size;
             sweep(node, axis, parts[chunk], splits[chunk]);

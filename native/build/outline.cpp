@@ -35,12 +35,15 @@ HWY_INLINE Values upper_at(const Outline& outline, Values positions) {
 void grow_bins_task(const Outline& outline, const Part& part, int count, float* lowers,
                     float* uppers) {
     const Lanes lanes;
-    const Values one = hn::Set(lanes, 1.0F), end = hn::Set(lanes, float(count));
+    const Values zero = hn::Zero(lanes), one = hn::Set(lanes, 1.0F);
+    const Values end = hn::Set(lanes, float(count));
     const Values first = hn::Set(lanes, part.first), last = hn::Set(lanes, part.last);
     const Values lowest = hn::Set(lanes, part.lowest), highest = hn::Set(lanes, part.highest);
     for (int i = 0; i < count; i += int(hn::Lanes(lanes))) {
         const Values bins = hn::Iota(lanes, float(i));
-        const Values from = hn::Max(bins, first), to = hn::Min(hn::Add(bins, one), last);
+        const Values next = hn::Add(bins, one);
+        const Values from = hn::IfThenElse(hn::Eq(bins, zero), first, bins);
+        const Values to = hn::IfThenElse(hn::Eq(next, end), last, next);
         const Values lower = hn::Min(lower_at(outline, from), lower_at(outline, to));
         const Values upper = hn::Max(upper_at(outline, from), upper_at(outline, to));
         const Values cropped_lower = hn::Min(hn::Max(lower, lowest), highest);

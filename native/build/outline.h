@@ -23,8 +23,8 @@ struct Part {
 /// Bins that are grown at a time. Rows of bins need so many unused elements at their end.
 inline constexpr int bin_lanes = 8;
 
-/// Grows the bounds of `count` bins by the outline cropped to the part; bin i is from position i to i + 1.
-/// The middle corner itself is not seen. The same on all processors: SIMD only changes the speed.
+/// Grows the bounds of `count` bins by the outline cropped to the part. Bin i is from position i to i + 1, but the
+/// first and the last bin take in all of the part that is below and above. The middle corner itself is not seen. The same on all processors: SIMD only changes the speed.
 void grow_bins(const Outline& outline, const Part& part, int count, float* lowers, float* uppers);
 
 }  // namespace bvhlab

@@ -2,6 +2,7 @@
 #include "bvh/collapse.h"
 
 #include <array>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -33,17 +34,12 @@ public:
         Plan<K>& plan = plans_[node];
         plan.size = size(left) + size(right);
 
-        // best[j] = min over i of C(left, i) + C(right, j - i), for j = 2..k.
-        Costs best;
-        best.fill(infinity);
-        std::array<std::uint8_t, K + 1> share{};
-        for (unsigned i = 1; i < K; ++i) {
-            for (unsigned j = i + 1; j <= K; ++j) {
-                const float cost = left_costs[i] + right_costs[j - i];
-                share[j] = cost < best[j] ? std::uint8_t(i) : share[j];
-                best[j] = cost < best[j] ? cost : best[j];
-            }
-        }
+        Costs best;  // best[j] = min over i of C(left, i) + C(right, j - i), for j = 2..k
+        Shares share{};
+        if (binary_.is_leaf(left) || binary_.is_leaf(right))
+            add_leaf(left_costs, right_costs, binary_.is_leaf(left), best, share);
+        else
+            share_out(left_costs, right_costs, best, share);
 
         // One tree: a leaf of all references, or a wide node over a forest of k. A tie makes a leaf.
         const float relative_area = area(node);
@@ -51,14 +47,14 @@ public:
             relative_area * intersection_ * float(charged_tests(plan.size, K));
         const float as_node = relative_area * traversal_ + best[K];
         plan.cost[1] = as_leaf <= as_node ? as_leaf : as_node;
-        plan.left_share[1] = as_leaf <= as_node ? Plan<K>::leaf : share[K];
-        plan.node_share = share[K];
+        plan.left_share[1] = as_leaf <= as_node ? Plan<K>::leaf : std::uint8_t(share[K]);
+        plan.node_share = std::uint8_t(share[K]);
 
         // At most j trees: j - 1 of them where more do not help.
         for (unsigned j = 2; j < K; ++j) {
             const bool fewer = plan.cost[j - 1] <= best[j];
             plan.cost[j] = fewer ? plan.cost[j - 1] : best[j];
-            plan.left_share[j] = fewer ? Plan<K>::fewer : share[j];
+            plan.left_share[j] = fewer ? Plan<K>::fewer : std::uint8_t(share[j]);
         }
     }
 
@@ -67,6 +63,32 @@ public:
 private:
     using Costs = std::array<float, K + 1>;
     static constexpr float infinity = std::numeric_limits<float>::infinity();
+
+    using Shares = std::array<std::int32_t, K + 1>;
+
+    /// A leaf takes one tree and more do not help it: the other child has the rest.
+    static void add_leaf(const Costs& left, const Costs& right, bool left_is_leaf, Costs& best,
+                         Shares& share) {
+        for (unsigned j = 2; j <= K; ++j) {
+            best[j] = left_is_leaf ? left[1] + right[j - 1] : left[j - 1] + right[1];
+            share[j] = left_is_leaf ? 1 : std::int32_t(j - 1);
+        }
+    }
+
+    /// All j at once, so that the compiler can use SIMD lanes; infinite entries stand where j - i is not in 1..k-1.
+    static void share_out(const Costs& left, const Costs& right, Costs& best, Shares& share) {
+        std::array<float, 2 * K + 1> shifted;
+        shifted.fill(infinity);
+        for (unsigned j = 1; j < K; ++j) shifted[K + j] = right[j];
+        best.fill(infinity);
+        for (unsigned i = 1; i < K; ++i) {
+            for (unsigned j = 1; j <= K; ++j) {
+                const float cost = left[i] + shifted[K + j - i];
+                share[j] = cost < best[j] ? std::int32_t(i) : share[j];
+                best[j] = cost < best[j] ? cost : best[j];
+            }
+        }
+    }
 
     /// Area relative to the root's; 1 in a scene without area, so that leaves are still compared by tests.
     float area(std::uint32_t node) const {

@@ -18,7 +18,8 @@ struct Opened {
     unsigned count = 0;
 };
 
-/// Reads the plans top-down and fills nodes and blocks, one level at a time.
+/// Reads the plans top-down, one level at a time, to find each node's children and where they go; then fills all nodes and
+/// blocks at once.
 template <unsigned K>
 class Layout {
 public:
@@ -26,18 +27,30 @@ public:
         : binary_(binary), plans_(plans), mesh_(mesh), token_(token) {}
 
     void run(Bvh& bvh) {
-        auto& wide = bvh.tree.template emplace<WideBvh<K>>();
+        Place end;  // of what is placed so far
+        end.interior = 1;
         std::vector<std::uint32_t> level{0};  // binary node of each wide node of the level
         while (!level.empty()) {
             ++bvh.max_depth;
-            level = lay_out_level(level, wide, bvh);
+            level = open_level(level, end);
         }
+        bvh.leaf_count = end.leaf;
+        bvh.reference_count = end.reference;
+        bvh.max_leaf_size = end.largest_leaf;
+
+        auto& wide = bvh.tree.template emplace<WideBvh<K>>();
+        wide.nodes.resize(opened_.size());
+        wide.blocks.resize(end.block);
+        parallel_for_each(opened_.size(), grain, token_, [&](std::size_t i) {
+            fill_node(wide.nodes[i], opened_[i], places_[i], wide.blocks.data());
+        });
     }
 
 private:
+    static constexpr std::size_t grain = 256;
     static constexpr unsigned lanes = block_lanes<K>;
 
-    /// Where the children of a wide node go: sums over the nodes before it in the level.
+    /// Where the children of a wide node go: sums over the nodes before it.
     struct Place {
         std::uint32_t interior = 0, block = 0, leaf = 0, reference = 0, largest_leaf = 0;
     };
@@ -91,60 +104,49 @@ private:
         return place;
     }
 
-    /// Turns extents into places by an exclusive sum from `start`; returns the end.
-    static Place accumulate(std::vector<Place>& extents, Place start) {
-        for (Place& extent : extents) {
-            const Place here = start;
-            start.interior += extent.interior;
-            start.block += extent.block;
-            start.leaf += extent.leaf;
-            start.reference += extent.reference;
-            start.largest_leaf = std::max(start.largest_leaf, extent.largest_leaf);
-            extent = here;
+    /// Opens the wide nodes of one level and places their children behind `end`. Returns the binary nodes of the next level.
+    std::vector<std::uint32_t> open_level(const std::vector<std::uint32_t>& level, Place& end) {
+        const std::size_t first = opened_.size();
+        const std::uint32_t next_level = end.interior;
+        opened_.resize(first + level.size());
+        places_.resize(first + level.size());
+        parallel_for_each(level.size(), grain, token_, [&](std::size_t i) {
+            opened_[first + i] = open_wide_node(level[i]);
+            places_[first + i] = extent(opened_[first + i]);
+        });
+
+        // Turn extents into places by an exclusive sum.
+        std::vector<std::uint32_t> next;
+        for (std::size_t i = first; i < opened_.size(); ++i) {
+            const Place extent = std::exchange(places_[i], end);
+            end.interior += extent.interior;
+            end.block += extent.block;
+            end.leaf += extent.leaf;
+            end.reference += extent.reference;
+            end.largest_leaf = std::max(end.largest_leaf, extent.largest_leaf);
         }
-        return start;
+        next.reserve(end.interior - next_level);
+        for (std::size_t i = first; i < opened_.size(); ++i)
+            for (unsigned c = 0; c < opened_[i].count; ++c)
+                if (!opened_[i].is_leaf[c]) next.push_back(opened_[i].child[c]);
+        return next;
     }
 
-    std::vector<std::uint32_t> lay_out_level(const std::vector<std::uint32_t>& level,
-                                             WideBvh<K>& wide, Bvh& bvh) {
-        constexpr std::size_t grain = 256;
-        const std::size_t first_node = wide.nodes.size();
-        const std::size_t next_level = first_node + level.size();
-
-        std::vector<Opened<K>> opened(level.size());
-        std::vector<Place> places(level.size());
-        parallel_for_each(level.size(), grain, token_, [&](std::size_t i) {
-            opened[i] = open_wide_node(level[i]);
-            places[i] = extent(opened[i]);
-        });
-        const Place end = accumulate(places, {0, std::uint32_t(wide.blocks.size()), 0, 0, 0});
-
-        wide.nodes.resize(next_level);
-        wide.blocks.resize(end.block);
-        std::vector<std::uint32_t> next(end.interior);
-        parallel_for_each(level.size(), grain, token_, [&](std::size_t i) {
-            Place place = places[i];
-            WideNode<K>& node = wide.nodes[first_node + i];
-            clear(node);
-            for (unsigned c = 0; c < opened[i].count; ++c) {
-                const std::uint32_t child = opened[i].child[c];
-                node.set_box(c, binary_.boxes[child]);
-                if (opened[i].is_leaf[c]) {
-                    node.child[c] = place.block;
-                    node.count[c] = size(child);
-                    fill_blocks(child, wide.blocks.data() + place.block);
-                    place.block += (node.count[c] + lanes - 1) / lanes;
-                } else {
-                    node.child[c] = std::uint32_t(next_level) + place.interior;
-                    node.count[c] = 0;
-                    next[place.interior++] = child;
-                }
+    void fill_node(WideNode<K>& node, const Opened<K>& opened, Place place,
+                   TriangleBlock<lanes>* blocks) const {
+        clear(node);
+        for (unsigned c = 0; c < opened.count; ++c) {
+            const std::uint32_t child = opened.child[c];
+            node.set_box(c, binary_.boxes[child]);
+            if (opened.is_leaf[c]) {
+                node.child[c] = place.block;
+                node.count[c] = size(child);
+                fill_blocks(child, blocks + place.block);
+                place.block += (node.count[c] + lanes - 1) / lanes;
+            } else {
+                node.child[c] = place.interior++;
             }
-        });
-        bvh.leaf_count += end.leaf;
-        bvh.reference_count += end.reference;
-        bvh.max_leaf_size = std::max<std::size_t>(bvh.max_leaf_size, end.largest_leaf);
-        return next;
+        }
     }
 
     static void clear(WideNode<K>& node) {
@@ -190,6 +192,8 @@ private:
     const Array<Plan<K>>& plans_;
     const Mesh& mesh_;
     Token& token_;
+    Array<Opened<K>> opened_;  // by wide node
+    Array<Place> places_;      // of its children
 };
 
 }  // namespace

@@ -19,16 +19,17 @@ namespace py = pybind11;
 /// Float32 or float64 array of any shape, converted to contiguous float32 if it is not already.
 using FloatArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
 
-/// An array argument as contiguous float32 of shape (N, columns); N is free where `rows` is negative.
-/// Throws ValueError naming the argument for a non-numeric dtype or another shape.
+/// An array argument as contiguous float32 of shape (N, columns); N is free where `rows` is
+/// negative. Throws ValueError naming the argument for a non-numeric dtype or another shape.
 FloatArray float_rows(const py::handle& argument, const char* name, py::ssize_t columns,
                       py::ssize_t rows = -1);
 
 /// The rows of a (N, 3) array as vectors, without a copy; the array must outlive the span.
 std::span<const glm::vec3> as_vectors(const FloatArray& array);
 
-/// Ray arguments of every tracing function: keeps the numpy arrays alive and offers them as a batch.
-/// Throws ValueError naming the first ray that is not finite, has a zero direction, or a bad interval.
+/// Ray arguments of every tracing function: keeps the numpy arrays alive and offers them as a
+/// batch. Throws ValueError naming the first ray that is not finite, has a zero direction, or a bad
+/// interval.
 class RayArguments {
 public:
     RayArguments(const py::handle& origins, const py::handle& directions, const py::handle& t_min,

@@ -127,10 +127,18 @@ struct Search {
     void test(const Mesh& mesh, std::uint32_t index) {
         const Triangle corners = mesh.triangle(index);
         if (!line_meets(ray, corners)) return;
+        const Bounds t = bounds_of_t(ray, corners);
+        if (t.high < ray.t_min || t.low > farthest()) return;
         Crossing found = crossing(ray, corners);
         if (!in_interval(found, ray) || (nearest && !nearer(found, *nearest))) return;
         nearest = std::move(found);
         triangle = index;
+    }
+
+    /// No t above this can be the answer.
+    double farthest() const {
+        constexpr double margin = 1.0 + 0x1p-48;  // Crossing::t is a rounded value
+        return nearest ? nearest->t * margin : double(ray.t_max);
     }
 };
 

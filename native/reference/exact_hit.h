@@ -22,6 +22,13 @@ struct Crossing {
 /// area and a ray in the triangle's plane never meet.
 bool line_meets(const Ray& ray, const Triangle& triangle);
 
+/// Bounds that t of a line that meets the triangle is within, in double and quick: most triangles
+/// are behind the ray or beyond its nearest hit.
+struct Bounds {
+    double low, high;
+};
+Bounds bounds_of_t(const Ray& ray, const Triangle& triangle);
+
 /// The crossing of a line that meets the triangle.
 Crossing crossing(const Ray& ray, const Triangle& triangle);
 

@@ -7,6 +7,7 @@
 
 #include "render/offset.h"
 #include "render/sample_shapes.h"
+#include "render/spherical_rectangle.h"
 #include "scene/color.h"
 
 namespace bvhlab {
@@ -69,17 +70,28 @@ LightSample sample_sun(const Light& light, const glm::dvec2& random) {
     return {direction, true, glm::dvec3(light.color) * (2.0 / (2.0 - sagitta))};
 }
 
+/// A rectangle by solid angle, where that is large enough to be computed and to matter.
 LightSample sample_area(const Light& light, const glm::dvec3& position, const glm::dvec2& random) {
+    const glm::dvec3 edge_x = light.size_x * axis(light, 0), edge_y = light.size_y * axis(light, 1);
+    const glm::dvec3 to_centre = centre(light) - position;
+    const glm::dvec3 back = shining_back(light);
+    LightSample sample{to_centre, false, glm::dvec3(0.0)};
+    if (!(glm::dot(to_centre, back) > 0.0)) return sample;
+    const glm::dvec3 power(light.color);
+
+    const double area = light.size_x * light.size_y;
+    if (light.shape == LightShape::rectangle && area > 1e-4 * glm::dot(to_centre, to_centre)) {
+        const SphericalRectangle seen(to_centre - 0.5 * (edge_x + edge_y), edge_x, edge_y);
+        sample.to_light = seen.sample(random);
+        sample.irradiance = power * (seen.solid_angle() / (pi * area));
+        return sample;
+    }
     const glm::dvec2 place =
         light.shape == LightShape::disk ? 0.5 * sample_disk(random) : random - 0.5;
-    const glm::dvec3 point = centre(light) + place.x * light.size_x * axis(light, 0) +
-                             place.y * light.size_y * axis(light, 1);
-    LightSample sample{point - position, false, glm::dvec3(0.0)};
+    sample.to_light += place.x * edge_x + place.y * edge_y;
     const double squared = glm::dot(sample.to_light, sample.to_light);
-    const double towards = glm::dot(sample.to_light, shining_back(light));
-    if (squared > 0.0 && towards > 0.0)
-        sample.irradiance =
-            glm::dvec3(light.color) * (towards / (pi * squared * std::sqrt(squared)));
+    sample.irradiance =
+        power * (glm::dot(sample.to_light, back) / (pi * squared * std::sqrt(squared)));
     return sample;
 }
 

@@ -34,11 +34,13 @@ unsigned mask_bits(D d, M mask) {
     return bits[0];
 }
 
-/// Distances at which the ray enters the children of a node; bit i of the result is set where it enters child i no
-/// farther than `t_far`.
-template <unsigned K>
+/// Bit i of the result is set where the ray enters child i of the node no farther than `t_far`; `urgency[i]` then says
+/// which child comes first, the least: the distance at which its box is entered, or, for any hit, minus
+/// the distance at which it is left. The nearest boxes hold the surroundings of the ray's origin, which
+/// seldom block it: on the diffuse rays of crytek_sponza, farthest first visits a third of the nodes.
+template <unsigned K, bool AnyHit>
 HWY_INLINE unsigned enter_children(const WideNode<K>& node, const PreparedRay& ray, float t_far,
-                                   float (&near)[K]) {
+                                   float (&urgency)[K]) {
     const hn::CappedTag<float, K> d;
     const auto distance = [&](int plane, float origin, float inverse, unsigned i) {
         return hn::Mul(hn::Sub(hn::Load(d, node.planes[plane] + i), hn::Set(d, origin)),
@@ -55,7 +57,7 @@ HWY_INLINE unsigned enter_children(const WideNode<K>& node, const PreparedRay& r
         const auto enter =
             hn::Max(hn::Max(near_x, near_y), hn::Max(near_z, hn::Set(d, ray.t_min)));
         const auto leave = hn::Min(hn::Min(far_x, far_y), hn::Min(far_z, hn::Set(d, t_far)));
-        hn::Store(enter, d, near + i);
+        hn::Store(AnyHit ? hn::Neg(leave) : enter, d, urgency + i);
         entered |= mask_bits(d, hn::Le(enter, leave)) << i;
     }
     return entered;
@@ -138,33 +140,33 @@ public:
                     return hit;
                 }
                 current = *--top;
-            } while (current.near > hit.t);
+            } while (!AnyHit && current.urgency > hit.t);
         }
     }
 
 private:
-    /// Enters the children of node `current.child`: the nearest becomes `current`, the others go on the stack, farthest
-    /// first. Returns false where none is entered.
+    /// Enters the children of node `current.child`: the most urgent becomes `current`, the others go on the stack, the
+    /// least urgent first. Returns false where none is entered.
     HWY_INLINE bool descend(const PreparedRay& ray, float t_far, StackEntry& current,
                             StackEntry*& top) {
         if constexpr (Count) ++node_visits;
         const WideNode<K>& node = tree_.nodes[current.child];
-        HWY_ALIGN float near[K];
-        unsigned entered = enter_children<K>(node, ray, t_far, near);
+        HWY_ALIGN float urgency[K];
+        unsigned entered = enter_children<K, AnyHit>(node, ray, t_far, urgency);
         if (entered == 0) return false;
 
         unsigned i = unsigned(std::countr_zero(entered));
-        current = {near[i], node.child[i], node.count[i]};
+        current = {urgency[i], node.child[i], node.count[i]};
         entered &= entered - 1;
         StackEntry* const first = top;
         while (entered != 0) {
             i = unsigned(std::countr_zero(entered));
             entered &= entered - 1;
-            StackEntry entry{near[i], node.child[i], node.count[i]};
-            if (entry.near < current.near) std::swap(entry, current);
-            // Insert by distance: the pushed entries stay sorted, nearest on top.
+            StackEntry entry{urgency[i], node.child[i], node.count[i]};
+            if (entry.urgency < current.urgency) std::swap(entry, current);
+            // The pushed entries stay sorted, the most urgent on top.
             StackEntry* place = top++;
-            for (; place != first && place[-1].near < entry.near; --place) *place = place[-1];
+            for (; place != first && place[-1].urgency < entry.urgency; --place) *place = place[-1];
             *place = entry;
         }
         return true;

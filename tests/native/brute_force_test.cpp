@@ -125,15 +125,77 @@ TEST(BruteForce, SharedEdgeGoesToTheLowerTriangle) {
 
 TEST(BruteForce, TiesGoToTheLowerTriangle) {
     EXPECT_EQ(shoot(test::copies(70), {0.25F, 0.25F, 1}, {0, 0, -1}).hit.triangle, 0U);
-    // One plane by two triangles: t is equal in real arithmetic, but rarely after rounding.
-    const Mesh exact =
-        make_mesh({{0, 0, 1}, {3, 0, 2}, {0, 3, 4}, {6, 0, 3}, {0, 6, 7}}, {{0, 3, 4}, {0, 1, 2}});
-    const Mesh turned =
-        make_mesh({{0, 0, 1}, {3, 0, 2}, {0, 3, 4}, {6, 0, 3}, {0, 6, 7}}, {{2, 0, 1}, {4, 0, 3}});
-    for (int i = 1; i < 100; ++i) {
-        const glm::vec3 origin(0.01F * float(i), 0.37F, -1.1F), direction(0.013F, 0.007F, 0.9F);
-        EXPECT_EQ(shoot(exact, origin, direction).hit.triangle, 0U);
-        EXPECT_EQ(shoot(turned, origin, direction).hit.triangle, 0U);
+}
+
+/// A whole number in [-bound, bound].
+float whole(std::mt19937& random, int bound) {
+    return float(int(random() % std::uint32_t(2 * bound + 1)) - bound);
+}
+
+glm::vec3 whole_vector(std::mt19937& random, int bound) {
+    const float x = whole(random, bound), y = whole(random, bound);
+    return {x, y, whole(random, bound)};
+}
+
+TEST(BruteForce, TiesThatDoubleCannotTell) {
+    // One plane by two triangles: t is equal in real arithmetic, but not always after rounding.
+    std::mt19937 random(12);
+    for (int i = 0; i < 200; ++i) {
+        const glm::vec3 a = whole_vector(random, 1 << 20);
+        const glm::vec3 p = whole_vector(random, 1 << 20), q = whole_vector(random, 1 << 20);
+        const Array<glm::vec3> corners = {a, a + p, a + q, a + 3.0F * p, a + 3.0F * q};
+        const glm::vec3 origin = whole_vector(random, 1 << 20);
+        const glm::vec3 direction = a + glm::floor(0.3F * (p + q)) - origin;
+        const Answer large_first =
+            shoot(make_mesh(corners, {{0, 3, 4}, {0, 1, 2}}), origin, direction);
+        const Answer small_first =
+            shoot(make_mesh(corners, {{2, 0, 1}, {4, 0, 3}}), origin, direction);
+        EXPECT_EQ(large_first.hit.triangle, 0U);
+        EXPECT_EQ(small_first.hit.triangle, 0U);
+    }
+}
+
+TEST(BruteForce, IntervalIsExact) {
+    std::mt19937 random(11);
+    for (int i = 0; i < 200; ++i) {
+        const glm::vec3 corner = whole_vector(random, 1 << 20);
+        const glm::vec3 direction = whole_vector(random, 1 << 20);
+        const Mesh mesh = make_mesh({corner, corner + whole_vector(random, 1 << 20),
+                                     corner + whole_vector(random, 1 << 20)},
+                                    {{0, 1, 2}});
+        // Whole numbers below 2^24 are exact: the ray meets the corner at t = 3 and nowhere near.
+        const glm::vec3 origin = corner - 3.0F * direction;
+        EXPECT_TRUE(shoot(mesh, origin, direction, 3.0F, 3.0F).occluded);
+        EXPECT_FALSE(shoot(mesh, origin, direction, 0.0F, std::nextafter(3.0F, 0.0F)).occluded);
+        EXPECT_FALSE(shoot(mesh, origin, direction, std::nextafter(3.0F, 4.0F)).occluded);
+    }
+}
+
+/// Three whole vectors below 2^22 with determinant 1: a product of row additions.
+struct Unimodular {
+    glm::vec3 rows[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+
+    explicit Unimodular(std::mt19937& random) {
+        const auto size = [](glm::vec3 v) { return glm::dot(glm::abs(v), glm::vec3(1)); };
+        for (int tries = 0; tries < 400; ++tries) {
+            const std::uint32_t from = random() % 3, to = (from + 1 + random() % 2) % 3;
+            const glm::vec3 sum = rows[to] + whole(random, 3) * rows[from];
+            if (size(sum) < float(1 << 22)) rows[to] = sum;
+        }
+    }
+};
+
+TEST(BruteForce, SignsThatDoubleCannotTell) {
+    // The volumes are 1 or -1 while their terms are about 2^60: double alone would guess.
+    std::mt19937 random(13);
+    for (int i = 0; i < 200; ++i) {
+        const auto& [direction, b, c] = Unimodular(random).rows;
+        const auto meets = [&, d = direction, b = b, c = c](glm::vec3 across) {
+            return shoot(make_mesh({d + across, b, c}, {{0, 1, 2}}), glm::vec3(0), d).occluded;
+        };
+        EXPECT_TRUE(meets(-b - c));
+        EXPECT_FALSE(meets(c - b));
+        EXPECT_FALSE(meets(b - c));
     }
 }
 
@@ -220,6 +282,26 @@ TEST(BruteForce, FilterLosesNothing) {
             EXPECT_EQ(shoot(mesh, ray).hit.triangle, expected);
         }
     }
+}
+
+/// Rays across the tips of needles far from the origin touch the filter's spheres from outside.
+TEST(BruteForce, FilterLosesNoTip) {
+    std::mt19937 random(7);
+    int hits = 0;
+    for (int i = 0; i < 3000; ++i) {
+        const glm::vec3 along(test::uniform(random, -1, 1), 0, test::uniform(random, -1, 1));
+        const glm::vec3 needle(-along.z, 0, along.x);
+        const glm::vec3 middle = test::uniform_vector(random, -1e4F, 1e4F);
+        const glm::vec3 tip = middle + needle;
+        const Mesh mesh = make_mesh(
+            {tip, middle - needle, middle + along * 0.001F + glm::vec3(0, 0.01F, 0)}, {{0, 1, 2}});
+        const Ray ray{tip - along * test::uniform(random, 0, 3), 0.0F, along, infinity};
+        const bool expected =
+            line_meets(ray, mesh.triangle(0)) && in_interval(crossing(ray, mesh.triangle(0)), ray);
+        hits += expected;
+        EXPECT_EQ(shoot(mesh, ray).occluded, expected);
+    }
+    EXPECT_GT(hits, 100);
 }
 
 /// Rays of one batch, with a single interval.

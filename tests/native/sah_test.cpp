@@ -152,8 +152,8 @@ TEST(Sah, EverySplitIsTheBestOfTheSweep) {
 TEST(Sah, RootSplitOfALargeNodeIsTheBestOfTheSweep) {
     const Mesh mesh = random_soup(10000);  // more than one chunk
     const BinaryBvh bvh = build(mesh);
-    const auto [left, right] = bvh.children[0];
-    const double left_size = bvh.is_leaf(right) ? double(mesh.size() - 1) : double(right - left);
+    const auto [left, right] = bvh.children[0];  // as many nodes before the right one as leaves
+    const double left_size = bvh.is_leaf(right) ? double(mesh.size() - 1) : double(right);
     const double cost = bvh.boxes[left].half_area() * left_size +
                         bvh.boxes[right].half_area() * (double(mesh.size()) - left_size);
 

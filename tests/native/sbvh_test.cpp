@@ -16,6 +16,7 @@
 #include "build/object_split.h"
 #include "build/sah.h"
 #include "build/spatial_split.h"
+#include "bvh/collapse.h"
 #include "bvh/validate.h"
 #include "meshes.h"
 
@@ -57,14 +58,9 @@ Mesh needles(std::size_t count, float scale = 1.0F, std::uint32_t seed = 1) {
     return make_mesh(std::move(vertices), std::move(triangles));
 }
 
-/// Eq. 2 without leaves that hold more than one reference.
-double cost(const BinaryBvh& bvh) {
-    const CostModel model;
-    double sum = 0.0;
-    for (std::uint32_t node = 0; node < bvh.node_count(); ++node)
-        sum += (bvh.is_leaf(node) ? model.intersection : model.traversal) *
-               bvh.boxes[node].half_area();
-    return sum / bvh.boxes[0].half_area();
+double collapsed_cost(const BinaryBvh& bvh, const Mesh& mesh) {
+    Token token;
+    return cost(collapse(bvh, shared(mesh), 2, CostModel{}, token), CostModel{});
 }
 
 /// Leaf boxes of each triangle.
@@ -212,50 +208,49 @@ TEST(SpatialBins, FindTheBestPlane) {
 
 TEST(Sbvh, IsValidOnEveryShapeOfInput) {
     for (const Mesh& mesh :
-         {random_soup(1), random_soup(2), random_soup(3), random_soup(10000), needles(2),
-          needles(3000), needles(500, 1e18F), needles(500, 1e-18F), needles(500, 5e36F),
-          needles(500, 1e-40F), growing_chain(3000, 1.04), growing_chain(100, 3.0), sphere(30),
-          copies(1), copies(2000)})
+         {random_soup(1), random_soup(2), random_soup(3), random_soup(4500), needles(2),
+          needles(1000), needles(100, 1e18F), needles(100, 1e-18F), needles(100, 5e36F),
+          needles(100, 1e-40F), growing_chain(3000, 1.04), growing_chain(100, 3.0), sphere(30),
+          copies(1), copies(500)})
         for (const SbvhConfig& config : {SbvhConfig{}, eager()})
             EXPECT_NO_THROW(validate(build(mesh, config), mesh));
 }
 
 TEST(Sbvh, CopiesOfOneTriangleEndWithinTheBudget) {
-    const std::size_t count = 100000;
+    const std::size_t count = 6000;  // more than one chunk
     const Mesh mesh = make_mesh({{0, 0, 0}, {1, 0.9F, 0.8F}, {0.9F, 1, 0.7F}},
                                 Array<glm::uvec3>(count, glm::uvec3(0, 1, 2)));
-    const BinaryBvh bvh = build(mesh, {.max_references = 1.5});
+    const BinaryBvh bvh = build(mesh, {.max_references = 2.5});
     EXPECT_NO_THROW(validate(bvh, mesh));
     EXPECT_GT(bvh.reference_count(), count);
-    EXPECT_LE(bvh.reference_count(), count * 3 / 2);
+    EXPECT_LE(bvh.reference_count(), count * 5 / 2);
 }
 
 TEST(Sbvh, LeafBoxesCoverEveryTriangle) {
     std::mt19937 random(11);
     std::size_t references = 0;
-    for (const float scale : {1.0F, 1e15F, 1e-15F}) {
-        for (const Mesh& mesh : {needles(300, scale), needles(5000, scale)}) {
-            const BinaryBvh bvh = build(mesh, eager());
-            references += bvh.reference_count();
-            const auto boxes = boxes_by_triangle(bvh, mesh.size());
-            for (std::size_t i = 0; i < mesh.size(); ++i)
-                for (int sample = 0; sample < 20; ++sample)
-                    ASSERT_TRUE(is_covered(point_of(mesh.triangle(i), random), mesh.box(i),
-                                           boxes[i], random));
-        }
+    for (const Mesh& mesh : {needles(300), needles(300, 1e15F), needles(300, 1e-15F),
+                             needles(4500)}) {  // the last is more than one chunk
+        const BinaryBvh bvh = build(mesh, eager());
+        references += bvh.reference_count();
+        const auto boxes = boxes_by_triangle(bvh, mesh.size());
+        for (std::size_t i = 0; i < mesh.size(); ++i)
+            for (int sample = 0; sample < 20; ++sample)
+                ASSERT_TRUE(is_covered(point_of(mesh.triangle(i), random), mesh.box(i), boxes[i],
+                                       random));
     }
-    EXPECT_GT(references, 2U * 3U * 5300U);  // there were cuts to test
+    EXPECT_GT(references, 2U * 5400U);  // there were cuts to test
 }
 
 TEST(Sbvh, CostsLessThanObjectSplits) {
     const Mesh mesh = needles(2000);
     Token token;
-    const double without = cost(build_sah(mesh, CostModel{}, token));
-    EXPECT_LT(cost(build(mesh)), 0.7 * without);
+    const double without = collapsed_cost(build_sah(mesh, CostModel{}, token), mesh);
+    EXPECT_LT(collapsed_cost(build(mesh), mesh), 0.9 * without);
 }
 
 TEST(Sbvh, WithoutSpatialSplitsIsSah) {
-    const Mesh mesh = needles(6000);
+    const Mesh mesh = needles(4500);
     Token token;
     const BinaryBvh sah = build_sah(mesh, CostModel{}, token);
     EXPECT_TRUE(same(sah, build(mesh, {.max_spatial_depth = 0})));
@@ -264,13 +259,13 @@ TEST(Sbvh, WithoutSpatialSplitsIsSah) {
 }
 
 TEST(Sbvh, SmallerLeavesAreSplitOn) {
-    const Mesh mesh = needles(3000);
+    const Mesh mesh = needles(500);
     EXPECT_LT(build(mesh, {.max_leaf_size = 8}).reference_count(),
               build(mesh, {.max_leaf_size = 1}).reference_count());
 }
 
 TEST(Sbvh, IsTheSameForAnyThreadCount) {
-    const Mesh mesh = needles(12000);
+    const Mesh mesh = needles(5000);
     const BinaryBvh one = with_threads(1, [&] { return build(mesh); });
     const BinaryBvh many = with_threads(7, [&] { return build(mesh); });
     EXPECT_TRUE(same(one, many));
@@ -278,7 +273,7 @@ TEST(Sbvh, IsTheSameForAnyThreadCount) {
 }
 
 TEST(Sbvh, IsTheSameForAnyInstructionSet) {
-    const Mesh mesh = needles(2000);
+    const Mesh mesh = needles(300);
     const BinaryBvh best = build(mesh);
     const auto supported = hwy::SupportedTargets();
     for (auto target = supported & -supported, rest = supported; rest != 0;
