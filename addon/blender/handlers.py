@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""No worker thread outlives the file it works for, the add-on, or Blender."""
+
+from __future__ import annotations
+
+import atexit
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import store
+
+
+@persistent
+def _forget(*_: object) -> None:
+    store.clear()
+
+
+def register() -> None:
+    """Stop and forget before another file opens, and at exit."""
+    bpy.app.handlers.load_pre.append(_forget)
+    atexit.register(store.stop)
+
+
+def unregister() -> None:
+    """Stop and forget now."""
+    store.clear()
+    atexit.unregister(store.stop)
+    bpy.app.handlers.load_pre.remove(_forget)

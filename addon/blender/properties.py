@@ -1,0 +1,253 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings kept in the file, ``Scene.bvh_lab``; the panel's state, ``WindowManager.bvh_lab``."""
+
+from __future__ import annotations
+
+import zlib
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from ..native import load
+from ..study.plan import BRANCHINGS, Plan
+from . import preferences, store
+
+QUICK = Plan()
+COLUMNS = ("NAME", "BUILD", "COST", "SPEED", "RATIO", "WRONG")
+
+_devices: list[tuple[str, str, str, int]] = []  # Blender keeps no reference to the strings
+
+
+def _device_items(
+    settings: BVHLAB_PG_settings, context: bpy.types.Context | None
+) -> list[tuple[str, str, str, int]]:
+    """The devices that can be used; a number depends on the id alone, so that files keep theirs."""
+    if not _devices and not store.native_reason():
+        for device in load().devices():
+            if device["available"]:
+                number = 0 if device["id"] == "cpu" else zlib.crc32(device["id"].encode()) >> 1
+                name = f"CPU, {device['name']}" if device["id"] == "cpu" else device["name"]
+                text = f"{device['threads']} threads"
+                _devices.append((device["id"], name, text, number))
+    return _devices or [("cpu", "CPU", "The processor", 0)]
+
+
+def _percent(panel: BVHLAB_PG_panel) -> float:
+    return 100.0 * store.running.job.fraction if store.running else 0.0
+
+
+def _ignore(panel: BVHLAB_PG_panel, value: float) -> None:
+    """The bar shows; it does not set."""
+
+
+class BVHLAB_PG_settings(bpy.types.PropertyGroup):
+    """What to compare. Builders are switches of their own, so that a click toggles one."""
+
+    use_lbvh: BoolProperty(
+        name="LBVH",
+        description="Linear BVH: sorts the triangles along a curve. The fastest to build",
+        default=True,
+    )
+    use_sah: BoolProperty(
+        name="SAH",
+        description="Full sweep of the surface area heuristic: slow to build, fast to trace",
+        default=True,
+    )
+    use_sbvh: BoolProperty(
+        name="SBVH",
+        description="SAH with spatial splits, which cut long triangles. The slowest to build",
+        default=True,
+    )
+    use_2: BoolProperty(name="2", description="Binary: two children a node", default=True)
+    use_4: BoolProperty(name="4", description="Four children a node", default=True)
+    use_8: BoolProperty(name="8", description="Eight children a node", default=True)
+    order: EnumProperty(
+        name="Ray Order",
+        description="In which order the rays are traced",
+        items=[
+            ("off", "As Is", "Trace rays in the order of the pixels", 0),
+            ("on", "Sorted", "Sort rays first, so that neighbours go the same way", 1),
+            ("both", "Both", "Compare both: twice as many variants", 2),
+        ],
+    )
+    device: EnumProperty(name="Device", description="What builds and traces", items=_device_items)
+    geometry: EnumProperty(
+        name="Geometry",
+        description="Which state of the scene to measure",
+        items=[
+            ("viewport", "Viewport", "What the viewport shows: eye icons, viewport levels", 0),
+            ("render", "Render", "What a final render sees: camera icons, render levels", 1),
+        ],
+    )
+    preset: EnumProperty(
+        name="Preset",
+        description="How much to measure",
+        items=[
+            ("quick", "Quick", "Resolution and samples of your choice", 0),
+            ("paper", "Paper", "1024 x 768 pixels and three views, as in the paper", 1),
+        ],
+    )
+    resolution: IntProperty(
+        name="Resolution",
+        description="Pixels along the longer side of the picture",
+        default=QUICK.long_side,
+        min=8,
+        soft_min=64,
+        soft_max=2048,
+        max=16384,
+        subtype="PIXEL",
+    )
+    samples: IntProperty(
+        name="Samples",
+        description="Samples a pixel, for the picture only: speed is measured with one ray a pixel",
+        default=QUICK.samples,
+        min=1,
+        soft_max=64,
+        max=4096,
+    )
+    views: IntProperty(
+        name="Views",
+        description="How many cameras to look through, the active one first",
+        default=3,
+        min=1,
+        soft_max=8,
+        max=1000,
+    )
+    repeats: IntProperty(
+        name="Repeats",
+        description="Timed runs of which the median counts",
+        default=QUICK.repeats,
+        min=3,
+        soft_max=25,
+        max=1000,
+    )
+    judged_rays: IntProperty(
+        name="Checked Rays",
+        description="Rays of each view and kind that are checked against brute force",
+        default=QUICK.judged_rays,
+        min=0,
+        soft_max=10_000,
+        max=1_000_000,
+    )
+    embree: BoolProperty(
+        name="Embree for Comparison",
+        description="Add rows for Embree, the ray tracer inside Cycles, on the same rays",
+        default=True,
+    )
+    pictures: BoolProperty(
+        name="Pictures", description="Render a picture with every variant", default=True
+    )
+
+    def builders(self) -> list[str]:
+        """Ids of the builders switched on, of those that the core offers."""
+        offered = [str(builder["id"]) for builder in store.builders()]
+        return [name for name in offered if getattr(self, f"use_{name}", False)]
+
+    def branchings(self) -> list[int]:
+        """The branching factors switched on."""
+        return [branching for branching in BRANCHINGS if getattr(self, f"use_{branching}")]
+
+    def plan(self) -> Plan:
+        """These settings as a plan."""
+        plan = Plan.from_preset(self.preset)
+        plan.builders, plan.branchings = self.builders(), self.branchings()
+        plan.reorders = {"off": [False], "on": [True], "both": [False, True]}[self.order]
+        plan.devices = [self.device or "cpu"]
+        plan.threads = preferences.threads()
+        if self.preset == "quick":
+            plan.long_side, plan.samples, plan.views = self.resolution, self.samples, self.views
+        plan.repeats, plan.judged_rays = self.repeats, self.judged_rays
+        plan.embree, plan.pictures = self.embree, self.pictures
+        return plan
+
+    def variants(self) -> int:
+        """How many variants the settings ask for."""
+        return len(self.builders()) * len(self.branchings()) * (2 if self.order == "both" else 1)
+
+
+class BVHLAB_PG_row(bpy.types.PropertyGroup):
+    """A row of the table, by scene and variant; its numbers are in the store."""
+
+    scene: StringProperty()
+
+
+class BVHLAB_PG_panel(bpy.types.PropertyGroup):
+    """How the table is shown. Never saved, never undone."""
+
+    rows: CollectionProperty(type=BVHLAB_PG_row)
+    active: IntProperty(name="Variant", description="The variant of which the details are shown")
+    sort_column: EnumProperty(
+        items=[(name, name.title(), "", i) for i, name in enumerate(COLUMNS)], default="SPEED"
+    )
+    sort_reverse: BoolProperty(default=True)
+    baseline: StringProperty()
+    kind: EnumProperty(
+        name="Rays",
+        description="Which rays the table's speeds are of",
+        items=[
+            ("primary", "Primary", "Closest hit of one ray through each pixel", 0),
+            ("shadow", "Shadow", "Any hit towards a light, from where the primary rays hit", 1),
+            ("diffuse", "Diffuse", "Closest hit in random directions from the same places", 2),
+        ],
+    )
+    progress: FloatProperty(
+        name="Progress",
+        description="Finished part of the comparison",
+        subtype="PERCENTAGE",
+        precision=0,
+        min=0.0,
+        max=100.0,
+        get=_percent,
+        set=_ignore,  # without one Blender greys the bar out
+    )
+
+    def show(self, scene: str, names: list[str]) -> None:
+        """Make the table's rows of one scene those named."""
+        old = [index for index, row in enumerate(self.rows) if row.scene == scene]
+        if [self.rows[index].name for index in old] == names:
+            return
+        for index in reversed(old):
+            self.rows.remove(index)
+        for name in names:
+            row = self.rows.add()
+            row.name, row.scene = name, scene
+
+    def active_name(self, scene: str) -> str:
+        """Variant that is selected, if it is one of this scene's."""
+        if 0 <= self.active < len(self.rows) and self.rows[self.active].scene == scene:
+            return str(self.rows[self.active].name)
+        return ""
+
+    def select(self, scene: str, name: str) -> None:
+        """Select a variant of a scene."""
+        for index, row in enumerate(self.rows):
+            if (row.scene, row.name) == (scene, name):
+                self.active = index
+
+
+CLASSES = (BVHLAB_PG_settings, BVHLAB_PG_row, BVHLAB_PG_panel)
+
+
+def register() -> None:
+    """Put the settings on every scene and the panel's state on the window manager."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.Scene.bvh_lab = PointerProperty(type=BVHLAB_PG_settings)
+    bpy.types.WindowManager.bvh_lab = PointerProperty(type=BVHLAB_PG_panel, options={"SKIP_SAVE"})
+
+
+def unregister() -> None:
+    """Take them away; the settings' values stay in the file for the next time."""
+    del bpy.types.WindowManager.bvh_lab
+    del bpy.types.Scene.bvh_lab
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)
+    _devices.clear()

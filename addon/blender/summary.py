@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The result in a few plain sentences, and the texts of the table's cells. No bpy in here."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..study.results import Result, Row, ratio
+from ..study.table import title
+from .notes import listed
+
+MISSING = "-"
+
+
+def fastest(rows: Sequence[Row], kind: str) -> Row | None:
+    """The fastest of our own variants for one kind of ray that has no error."""
+    timed = [row for row in rows if row.system == "bvh_lab" and row.speed(kind) and not row.error]
+    return max(timed, key=lambda row: row.speed(kind).median, default=None)  # type: ignore[union-attr]
+
+
+def baseline(rows: Sequence[Row], chosen: str) -> Row | None:
+    """The row that ratios are of: the chosen one, else the first that has a tree."""
+    by_name = {row.name: row for row in rows}
+    return by_name.get(chosen) or next((row for row in rows if row.tree), None)
+
+
+def winner(rows: Sequence[Row], kind: str) -> list[str]:
+    """Who won, by how much, with what error; and who built fastest. Empty before a first speed."""
+    best = fastest(rows, kind)
+    if best is None:
+        return []
+    speed, errors = best.speed(kind), best.errors()
+    assert speed is not None
+    lines = [f"Fastest: {title(best)}, {wrong_hits(errors.wrong, errors.judged)}"]
+    pace = f"{speed.median:.2f} million {kind} rays a second (±{speed.half_percent:.0f}%)"
+    ours = [row for row in rows if row.system == "bvh_lab" and not row.error]
+    rivals = [(other, row) for row in ours if row is not best and (other := row.speed(kind))]
+    if rivals:
+        _, slowest = min(rivals, key=lambda pair: pair[0].median)
+        pace += f", {ratio(best, slowest, kind):.1f} times {title(slowest)}"
+    lines.append(pace)
+    if tied := [title(row) for other, row in rivals if other.high >= speed.low]:
+        lines.append(f"Perhaps as fast, their spreads overlap: {listed(tied)}")
+    if quickest := min((row for row in ours if row.build()), key=_build_seconds, default=None):
+        lines.append(f"Quickest to build: {title(quickest)}, {seconds(_build_seconds(quickest))}")
+    return lines
+
+
+def _build_seconds(row: Row) -> float:
+    build = row.build()
+    return build.median if build else float("inf")
+
+
+def wrong_hits(wrong: int, judged: int) -> str:
+    """Errors in words."""
+    if not judged:
+        return "no hits were checked"
+    return f"{wrong} wrong hit{'' if wrong == 1 else 's'} of {judged}"
+
+
+def pictures(result: Result) -> str:
+    """Whether all variants made the same picture; empty where none was made."""
+    made = [row for row in result.rows if row.pictures]
+    different = [row for row in made if row.picture_difference()]
+    if not made:
+        return ""
+    if not different:
+        return f"All {len(made)} pictures are equal, pixel for pixel" if len(made) > 1 else ""
+    worst = max(different, key=lambda row: row.picture_difference() or 0.0)
+    return f"{title(worst)} made another picture: it differs by {worst.picture_difference():.3g}"
+
+
+def seconds(value: float) -> str:
+    """A time in the unit that suits it."""
+    if value < 0.9995:
+        return f"{1e3 * value:.3g} ms" if value < 0.0995 else f"{1e3 * value:.0f} ms"
+    if value < 60.0:
+        return f"{value:.1f} s"
+    minutes, rest = divmod(round(value), 60)
+    return f"{minutes} min {rest} s"
+
+
+def cells(row: Row, kind: str, base: Row | None) -> dict[str, str]:
+    """The text of each of the table's columns."""
+    build, speed = row.build(), row.speed(kind)
+    errors = row.errors()
+    times = ratio(row, base, kind) if base else None
+    return {
+        "NAME": short_title(row),
+        "BUILD": seconds(build.median) if build else MISSING,
+        "COST": f"{row.tree.cost:.1f}" if row.tree else MISSING,
+        "SPEED": f"{speed.median:.2f}" if speed else MISSING,
+        "RATIO": f"{times:.2f}×" if times else MISSING,
+        "WRONG": str(errors.wrong) if errors.judged else MISSING,
+    }
+
+
+def short_title(row: Row) -> str:
+    """The row's name in as few letters as tell it apart."""
+    words = row.label.split()
+    # A rival's label holds its version: "Embree 3.13.5 robust".
+    name = f"{row.label} {row.branching}" if row.branching else f"{words[0]} {words[-1]}"
+    return f"{name} sorted" if row.reorder else name
+
+
+def sort_value(row: Row, column: str, kind: str) -> tuple[bool, float | str]:
+    """What a column sorts by; rows without a value come last when ascending."""
+    build, speed = row.build(), row.speed(kind)
+    values: dict[str, float | str | None] = {
+        "NAME": f"{row.label} {row.branching} {row.reorder}",
+        "BUILD": build.median if build else None,
+        "COST": row.tree.cost if row.tree else None,
+        "SPEED": speed.median if speed else None,
+        "RATIO": speed.median if speed else None,
+        "WRONG": float(row.errors().wrong) if row.errors().judged else None,
+    }
+    value = values[column]
+    return (value is None, "" if value is None and column == "NAME" else value or 0.0)
+
+
+def details(row: Row) -> list[tuple[str, str]]:
+    """Everything else about a row, as pairs of label and value."""
+    facts: list[tuple[str, str]] = []
+    tree = row.tree
+    if tree:
+        facts += [
+            ("Nodes", f"{tree.nodes:,d}, {tree.leaves:,d} of them leaves"),
+            ("References", f"{tree.references:,d}, {tree.average_leaf_size:.1f} a leaf"),
+            ("Depth", f"{tree.max_depth} levels"),
+            ("Memory", f"{tree.bytes / 1e6:.1f} MB"),
+        ]
+    for kind in ("primary", "shadow", "diffuse"):
+        if speed := row.speed(kind):
+            text = f"{speed.median:.2f} MRays/s ±{speed.half_percent:.0f}%"
+            facts.append((f"{kind.title()} Rays", text))
+        visits, tests = row.per_ray("node_visits", kind), row.per_ray("triangle_tests", kind)
+        if visits is not None and tests is not None:
+            facts.append(("", f"{visits:.1f} nodes, {tests:.1f} triangles a ray"))
+    errors = row.errors()
+    facts.append(("Wrong Hits", wrong_hits(errors.wrong, errors.judged)))
+    if row.threads:
+        facts.append(("Threads", str(row.threads)))
+    return facts

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guesses of how long the parts of a study take: they weigh its progress bar, nothing else.
+
+All are in seconds; each category's pace is corrected as soon as one of its steps was measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from .machine import usable_cores
+from .plan import Plan
+from .rays import View
+from .results import KINDS, Row
+
+BUILD_SECONDS_PER_MILLION = {"lbvh": 0.5, "sah": 4.0, "sbvh": 12.0, "embree": 1.5}
+TRACE_SECONDS_PER_MILLION = 0.5
+JUDGE_SECONDS_PER_TEST = 6e-9  # one brute-force ray against one triangle on one core
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Guesses for one plan on one mesh."""
+
+    plan: Plan
+    triangles: int
+    views: Sequence[View]
+
+    def build(self, builder: str) -> float:
+        """One build; ``builder`` may be "embree"."""
+        return 1e-6 * self.triangles * BUILD_SECONDS_PER_MILLION.get(builder, 5.0)
+
+    def trace(self, view: View) -> float:
+        """One kind of ray, traced once."""
+        return 1e-6 * view.pixels * TRACE_SECONDS_PER_MILLION
+
+    def render(self, view: View) -> float:
+        """One picture: a primary and a shadow ray per sample."""
+        return 2.0 * self.plan.samples * self.trace(view)
+
+    def judge(self) -> float:
+        """Brute force for one kind of ray in one view."""
+        return self.plan.judged_rays * self.triangles * JUDGE_SECONDS_PER_TEST / usable_cores()
+
+    def measure(self, row: Row) -> dict[str, float]:
+        """Everything that one built row takes, per category."""
+        ours = row.system == "bvh_lab"
+        runs = self.plan.repeats + (2 if ours else 1)  # warm-up, and counters for ours
+        traces = len(KINDS) * runs * sum(self.trace(view) for view in self.views)
+        renders = (
+            sum(self.render(view) for view in self.views) if ours and self.plan.pictures else 0.0
+        )
+        return {"trace": traces, "render": renders}
+
+    def planned(self, rows: Iterable[Row], builds: Iterable[str]) -> dict[str, float]:
+        """The whole study, per category; ``builds`` names a builder for each tree."""
+        total = {"judge": self.judge() * len(KINDS) * len(self.views)}
+        for builder in builds:
+            category = f"build {builder}"
+            seconds = self.build(builder) * self.plan.build_repeats
+            total[category] = total.get(category, 0.0) + seconds
+        for row in rows:
+            for category, seconds in self.measure(row).items():
+                total[category] = total.get(category, 0.0) + seconds
+        return total

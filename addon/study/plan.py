@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What to measure: every choice of a study in one plain record."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from itertools import product
+from typing import Any
+
+from .records import from_plain
+
+BRANCHINGS = (2, 4, 8)
+PRESETS = ("quick", "paper")
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One row of the study: a tree and how it is traced."""
+
+    builder: str
+    branching: int
+    reorder: bool
+    device: str
+
+    @property
+    def name(self) -> str:
+        """Name for files and look-up, e.g. "sbvh_8" or "sbvh_8_reordered"."""
+        parts = [self.builder, str(self.branching)]
+        if self.reorder:
+            parts.append("reordered")
+        if self.device != "cpu":
+            parts.append("".join(c if c.isalnum() else "-" for c in self.device))
+        return "_".join(parts)
+
+
+@dataclass
+class Plan:
+    """Every choice of a study. `check` names the first bad one.
+
+    ``views`` is a number of cameras (the first ones of the scene) or their names. ``width`` and
+    ``height`` are pixels; 0 for both means ``long_side`` along the longer side of each camera.
+    ``samples`` per pixel are for the picture only: speed is measured with one ray per pixel.
+    ``repeats`` counts the timed runs after one warm-up; ``build_repeats`` the timed builds.
+    ``judged_rays`` are compared with brute force for each view and kind of ray. ``memory_gib``
+    bounds the trees held at once (0: half of what is free at the start). ``threads`` 0 means all.
+    """
+
+    preset: str = "quick"
+    builders: list[str] = field(default_factory=lambda: ["lbvh", "sah", "sbvh"])
+    branchings: list[int] = field(default_factory=lambda: list(BRANCHINGS))
+    reorders: list[bool] = field(default_factory=lambda: [False])
+    devices: list[str] = field(default_factory=lambda: ["cpu"])
+    params: dict[str, dict[str, float]] = field(default_factory=dict)
+    views: int | list[str] = 3
+    long_side: int = 512
+    width: int = 0
+    height: int = 0
+    samples: int = 8
+    pictures: bool = True
+    embree: bool = True
+    repeats: int = 3
+    build_repeats: int = 3
+    judged_rays: int = 512
+    seed: int = 0
+    threads: int = 0
+    traversal: float = 3.0
+    intersection: float = 2.0
+    memory_gib: float = 0.0
+
+    @classmethod
+    def from_preset(cls, preset: str) -> Plan:
+        """The plan of a preset: "quick" (the default) or "paper".
+
+        "paper" takes what of Meister & Bittner 2022 applies to this version: 1024 x 768 pixels,
+        three views, c_T = 3, c_I = 2 and the builders' settings, which are their defaults.
+        """
+        if preset not in PRESETS:
+            raise ValueError(f"unknown preset {preset!r}; there are: {', '.join(PRESETS)}")
+        if preset == "paper":
+            return cls(preset="paper", width=1024, height=768)
+        return cls()
+
+    def preset_note(self) -> str:
+        """What the preset means, in a sentence for the report."""
+        if self.preset == "paper":
+            return (
+                "Preset paper: 1024x768, three views, c_T = 3, c_I = 2 and the paper's builder "
+                "settings; the paper's path tracing is not part of this version, so shadow and "
+                "random diffuse rays start at the primary hits only."
+            )
+        return "Preset quick: less resolution and fewer samples than the paper's 1024x768 and 32."
+
+    def variants(self) -> list[Variant]:
+        """All combinations, builders slowest."""
+        return [
+            Variant(*choice)
+            for choice in product(self.builders, self.branchings, self.reorders, self.devices)
+        ]
+
+    def check(
+        self,
+        builders: Sequence[Mapping[str, Any]] | None = None,
+        devices: Sequence[Mapping[str, Any]] | None = None,
+    ) -> None:
+        """Raise ValueError naming the first bad choice and what may stand there.
+
+        ``builders`` and ``devices`` are what the core offers (`core.builders()`, `core.devices()`);
+        without them only what needs no core is checked.
+        """
+        self._check_lists()
+        self._check_numbers()
+        if builders is not None:
+            _check_builders(self.builders, self.params, builders)
+        if devices is not None:
+            for device in self.devices:
+                _check_device(device, devices)
+
+    def _check_lists(self) -> None:
+        for name in ("builders", "branchings", "reorders", "devices"):
+            values = getattr(self, name)
+            if not values:
+                raise ValueError(f"{name} is empty; name at least one")
+            if len(set(values)) < len(values):
+                raise ValueError(f"{name} names one twice: {', '.join(map(str, values))}")
+        for branching in self.branchings:
+            if branching not in BRANCHINGS:
+                raise ValueError(f"branching {branching} is not known; it is 2, 4 or 8")
+        if self.preset not in PRESETS:
+            raise ValueError(f"unknown preset {self.preset!r}; there are: {', '.join(PRESETS)}")
+        if isinstance(self.views, list) and not self.views:
+            raise ValueError("views is empty; name at least one camera, or give a number")
+
+    def _check_numbers(self) -> None:
+        if (self.width == 0) != (self.height == 0):
+            raise ValueError(f"resolution {self.width}x{self.height} needs both width and height")
+        if isinstance(self.views, int):
+            _within("views", self.views, 1, 1000)
+        _within("long_side", self.long_side, 8, 16384)
+        if self.width:
+            _within("width", self.width, 8, 16384)
+            _within("height", self.height, 8, 16384)
+        _within("samples", self.samples, 1, 4096)
+        _within("repeats", self.repeats, 3, 1000)
+        _within("build_repeats", self.build_repeats, 1, 1000)
+        _within("judged_rays", self.judged_rays, 0, 1_000_000)
+        _within("seed", self.seed, 0, 2**32 - 1)
+        _within("threads", self.threads, 0, 4096)
+        _within("traversal", self.traversal, 1e-6, 1e6)
+        _within("intersection", self.intersection, 1e-6, 1e6)
+        _within("memory_gib", self.memory_gib, 0.0, 1e6)
+
+    def to_json(self) -> str:
+        """JSON text that `from_json` reads back into an equal plan."""
+        return json.dumps(asdict(self), indent=2, allow_nan=False)
+
+    @classmethod
+    def from_json(cls, text: str) -> Plan:
+        """The plan that `to_json` wrote; raises ValueError naming a bad field."""
+        return from_plain(cls, json.loads(text))
+
+
+def _within(name: str, value: float, low: float, high: float) -> None:
+    if not low <= value <= high:
+        raise ValueError(f"{name} is {value}; it must be from {low:g} to {high:g}")
+
+
+def _check_builders(
+    chosen: Sequence[str],
+    params: Mapping[str, Mapping[str, float]],
+    builders: Sequence[Mapping[str, Any]],
+) -> None:
+    known = {builder["id"]: builder for builder in builders}
+    for name in [*chosen, *params]:
+        if name not in known:
+            raise ValueError(f"unknown builder {name!r}; there are: {', '.join(known)}")
+    for name, settings in params.items():
+        parameters = {parameter["name"]: parameter for parameter in known[name]["parameters"]}
+        for key, value in settings.items():
+            if key not in parameters:
+                there = ", ".join(parameters) or "none"
+                raise ValueError(f"builder {name!r} has no parameter {key!r}; there are: {there}")
+            _within(f"{name}.{key}", value, parameters[key]["minimum"], parameters[key]["maximum"])
+
+
+def _check_device(chosen: str, devices: Sequence[Mapping[str, Any]]) -> None:
+    for device in devices:
+        if device["id"] == chosen:
+            if not device["available"]:
+                raise ValueError(f"device {chosen!r} cannot be used: {device['reason']}")
+            return
+    usable = ", ".join(str(device["id"]) for device in devices if device["available"])
+    raise ValueError(f"unknown device {chosen!r}; there are: {usable}")

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The folder of files that a user keeps of a study."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ..native import load
+from .html import html_page
+from .judge import picture_difference
+from .output import file_stems, publish_folder, staged_folder
+from .results import Result
+from .scene import Float32Array
+from .table import text_report
+
+PICTURES = "pictures"
+Pictures = Mapping[tuple[str, str], Float32Array]  # (variant name, view name) -> (H, W, 3)
+
+
+def write_report(result: Result, pictures: Pictures, out: Path) -> None:
+    """Write table.txt, results.csv, results.json, index.html and pictures/ into the folder ``out``.
+
+    Everything is written into a new folder beside it and renamed at the end. Raises OSError.
+    """
+    with staged_folder(out) as staging:
+        fill_report(result, pictures, staging)
+        publish_folder(staging, out)
+
+
+def fill_report(result: Result, pictures: Pictures, folder: Path) -> None:
+    """Write the report's files into a folder that exists."""
+    files = write_pictures(result, pictures, folder) if pictures else {}
+    texts = {
+        "table.txt": text_report(result),
+        "results.csv": result.to_csv(),
+        "results.json": result.to_json(),
+        "index.html": html_page(result, files, folder),
+    }
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+def write_pictures(result: Result, pictures: Pictures, folder: Path) -> dict[tuple[str, str], str]:
+    """Write PNG and EXR of every picture and, per view, of the largest difference.
+
+    Returns the PNG's name, relative to ``folder``, by variant and view; the difference stands under
+    the variant "". A difference PNG is scaled so that its largest value is white.
+    """
+    core = load()
+    if not core.features()["image"]:
+        result.notes.append("This build has no OpenImageIO: picture files are left out.")
+        return {}
+    (folder / PICTURES).mkdir(exist_ok=True)
+    stems = file_stems(view for _, view in pictures)
+    files: dict[tuple[str, str], str] = {}
+    for view, stem in stems.items():
+        first: tuple[Float32Array, str] | None = None
+        difference: Float32Array | None = None
+        for (variant, of_view), pixels in pictures.items():
+            if of_view != view:
+                continue
+            name = f"{PICTURES}/{stem}_{variant}"
+            files[variant, view] = f"{name}.png"
+            if first is not None and pixels is first[0]:  # equal, and already encoded
+                for suffix in (".png", ".exr"):
+                    shutil.copyfile(folder / f"{first[1]}{suffix}", folder / f"{name}{suffix}")
+                continue
+            for suffix in (".png", ".exr"):
+                core.write_image(str(folder / f"{name}{suffix}"), pixels)
+            if first is None:
+                first, difference = (pixels, name), np.zeros_like(pixels)
+            assert difference is not None
+            difference = np.maximum(difference, picture_difference(pixels, first[0]))
+        assert difference is not None
+        name = f"{PICTURES}/{stem}_difference"
+        files["", view] = f"{name}.png"
+        core.write_image(str(folder / f"{name}.exr"), difference)
+        core.write_image(str(folder / f"{name}.png"), difference / (difference.max() or 1.0))
+    return files

@@ -1,0 +1,329 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a study measured: one row per variant, with every repeat, to JSON and back and to CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import asdict, dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .plan import Plan
+from .records import from_plain
+
+KINDS = ("primary", "shadow", "diffuse")  # of rays: camera, any hit towards lights, cosine-weighted
+FORMAT = 1  # of results.json
+
+
+class Spread(NamedTuple):
+    """Median with the quartiles around it."""
+
+    low: float
+    median: float
+    high: float
+
+    @property
+    def half_percent(self) -> float:
+        """Half the distance between the quartiles, in percent of the median."""
+        return 50.0 * (self.high - self.low) / self.median if self.median else 0.0
+
+
+def spread(samples: list[float]) -> Spread:
+    """Median and quartiles (linear between samples) of at least one sample."""
+    low, median, high = np.percentile(samples, (25.0, 50.0, 75.0))
+    return Spread(float(low), float(median), float(high))
+
+
+@dataclass
+class Errors:
+    """Answers that differ from a judge's, among ``judged`` rays. Exact ties are no errors.
+
+    ``wrong_triangles`` are hits on another triangle at another distance (by over 4 float32 ulp).
+    ``largest_t_error`` is the largest |t - t_judge| / t_judge where both hit the same triangle.
+    """
+
+    judged: int = 0
+    false_misses: int = 0
+    false_hits: int = 0
+    wrong_triangles: int = 0
+    largest_t_error: float = 0.0
+
+    @property
+    def wrong(self) -> int:
+        """Number of wrong hits of any sort."""
+        return self.false_misses + self.false_hits + self.wrong_triangles
+
+    def plus(self, other: Errors) -> Errors:
+        """The errors of both samples together."""
+        return Errors(
+            self.judged + other.judged,
+            self.false_misses + other.false_misses,
+            self.false_hits + other.false_hits,
+            self.wrong_triangles + other.wrong_triangles,
+            max(self.largest_t_error, other.largest_t_error),
+        )
+
+
+@dataclass
+class Measurement:
+    """One variant, one view, one kind of ray.
+
+    ``key_seconds``, ``sort_seconds`` and ``traverse_seconds`` have one entry per timed repeat;
+    generating the rays is in none of them. ``node_visits`` and ``triangle_tests`` are sums over
+    ``rays``, from a run of their own (None where there are no counters). ``hits_sha256`` is the
+    hash of all answers, ``differing_rays`` how many differ from the reference variant's.
+    """
+
+    view: str
+    kind: str
+    rays: int
+    hits: int = 0
+    hits_sha256: str = ""
+    differing_rays: int = 0
+    errors: Errors = field(default_factory=Errors)
+    node_visits: int | None = None
+    triangle_tests: int | None = None
+    key_seconds: list[float] = field(default_factory=list)
+    sort_seconds: list[float] = field(default_factory=list)
+    traverse_seconds: list[float] = field(default_factory=list)
+
+    @property
+    def seconds(self) -> list[float]:
+        """Seconds of each repeat: keys, sort and traversal together."""
+        parts = zip(self.key_seconds, self.sort_seconds, self.traverse_seconds, strict=True)
+        return [sum(part) for part in parts]
+
+
+@dataclass
+class Picture:
+    """How one variant's picture of one view compares with the reference variant's.
+
+    ``largest_difference`` is over all pixels and channels, linear; 0 means equal pixel for pixel.
+    """
+
+    view: str
+    width: int
+    height: int
+    samples: int
+    rays: int
+    seconds: float
+    largest_difference: float
+    differing_pixels: int
+
+
+@dataclass
+class Tree:
+    """The size of a tree, in the words of `Bvh.stats`; ``cost`` is Eq. 2 (binary) or 3 (wide)."""
+
+    nodes: int
+    interior_nodes: int
+    leaves: int
+    references: int
+    max_depth: int
+    max_leaf_size: int
+    average_leaf_size: float
+    bytes: int
+    cost: float
+
+
+@dataclass
+class Row:
+    """One variant of the study (``system`` "bvh_lab") or a rival on the same rays ("embree").
+
+    ``build_seconds`` has one entry per timed build; for our trees it is ``tree_seconds`` (the
+    binary tree) plus ``collapse_seconds``. ``threads`` is what was used. ``error`` is empty unless
+    the variant failed; what was measured until then stays. ``group`` numbers the variants that
+    were measured interleaved: all are 1 unless the trees did not fit in memory together.
+    """
+
+    name: str
+    label: str
+    system: str
+    builder: str
+    branching: int
+    reorder: bool
+    device: str
+    threads: int = 0
+    group: int = 1
+    error: str = ""
+    tree: Tree | None = None
+    build_seconds: list[float] = field(default_factory=list)
+    tree_seconds: list[float] = field(default_factory=list)
+    collapse_seconds: list[float] = field(default_factory=list)
+    measurements: list[Measurement] = field(default_factory=list)
+    pictures: list[Picture] = field(default_factory=list)
+
+    def of_kind(self, kind: str) -> list[Measurement]:
+        """The measurements of one kind of ray that have been timed, one per view."""
+        return [m for m in self.measurements if m.kind == kind and m.traverse_seconds]
+
+    def speed(self, kind: str) -> Spread | None:
+        """MRays/s over all views: rays / sum of each view's median seconds; None if not measured.
+
+        The spread takes the sums of the views' quartiles, so ``low`` is from the slow ones.
+        """
+        timed = self.of_kind(kind)
+        if not timed:
+            return None
+        mega_rays = 1e-6 * sum(m.rays for m in timed)
+        spreads = [spread(m.seconds) for m in timed]
+        fast, median, slow = (sum(s[i] for s in spreads) for i in range(3))
+        return Spread(*(mega_rays / max(seconds, 1e-9) for seconds in (slow, median, fast)))
+
+    def build(self) -> Spread | None:
+        """Seconds of building; None if not built."""
+        return spread(self.build_seconds) if self.build_seconds else None
+
+    def per_ray(self, counter: str, kind: str) -> float | None:
+        """``counter`` ("node_visits" or "triangle_tests") per ray over all views, or None."""
+        counted = [m for m in self.measurements if m.kind == kind]
+        counts = [getattr(m, counter) for m in counted]
+        rays = sum(m.rays for m in counted)
+        return sum(counts) / rays if rays and None not in counts else None
+
+    def errors(self) -> Errors:
+        """Wrong hits against brute force over all views and kinds of ray."""
+        total = Errors()
+        for measurement in self.measurements:
+            total = total.plus(measurement.errors)
+        return total
+
+    def differing_rays(self) -> int | None:
+        """Rays of all views and kinds answered otherwise than by the reference variant."""
+        if not self.measurements:
+            return None
+        return sum(m.differing_rays for m in self.measurements)
+
+    def picture_difference(self) -> float | None:
+        """Largest difference to the reference variant's picture in any view, or None."""
+        return max((p.largest_difference for p in self.pictures), default=None)
+
+    def disagrees(self) -> bool:
+        """Whether one of our own variants answered otherwise than the reference: always a bug."""
+        different = bool(self.differing_rays()) or bool(self.picture_difference())
+        return self.system == "bvh_lab" and different
+
+
+@dataclass
+class Subject:
+    """The scene that was measured. ``geometry`` is "viewport", "render" or "mesh file"."""
+
+    name: str
+    source: str
+    geometry: str
+    frame: int
+    triangles: int
+    vertices: int
+    materials: int
+    lights: int
+    views: list[str]
+    sha256: str
+
+
+@dataclass
+class Machine:
+    """Where it was measured. ``host`` is the program around the study, e.g. "Blender 3.4.1"."""
+
+    cpu: str
+    cores: int
+    memory_gib: float
+    system: str
+    python: str
+    numpy: str
+    host: str
+    version: str
+    devices: list[dict[str, Any]]
+    features: dict[str, Any]
+    embree: str
+
+
+@dataclass
+class Result:
+    """A study's rows and all that must be known to read them."""
+
+    plan: Plan
+    subject: Subject
+    machine: Machine
+    started: str  # ISO 8601, UTC
+    seconds: float = 0.0
+    cancelled: bool = False
+    reference: str = ""  # name of the variant that the others are compared with
+    rows: list[Row] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)  # what was added, approximated or left out
+    format: int = FORMAT
+
+    def failed(self) -> list[Row]:
+        """Rows that carry an error or whose answers differ from the reference variant's."""
+        return [row for row in self.rows if row.error or row.disagrees()]
+
+    def row(self, name: str) -> Row:
+        """The row of that name; raises ValueError listing the names."""
+        for row in self.rows:
+            if row.name == name:
+                return row
+        raise ValueError(f"no row {name!r}; there are: {', '.join(r.name for r in self.rows)}")
+
+    def to_json(self) -> str:
+        """JSON text, with every repeat, that `from_json` reads back into an equal result."""
+        return json.dumps(asdict(self), indent=1, allow_nan=False, ensure_ascii=False)
+
+    @classmethod
+    def from_json(cls, text: str) -> Result:
+        """The result that `to_json` wrote; raises ValueError naming a bad field."""
+        plain = json.loads(text)
+        if isinstance(plain, dict) and plain.get("format") != FORMAT:
+            raise ValueError(f"results of format {plain.get('format')!r}; this reads {FORMAT}")
+        return from_plain(cls, plain)
+
+    def to_csv(self) -> str:
+        """One line per row, units in the column names, empty where there is no value."""
+        out = io.StringIO()
+        nothing = Row("", "", "", "", 0, False, "")
+        writer = csv.DictWriter(out, csv_record(nothing).keys(), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(csv_record(row) for row in self.rows)
+        return out.getvalue()
+
+
+def ratio(row: Row, baseline: Row, kind: str) -> float | None:
+    """Speed of ``row`` over that of ``baseline`` for one kind of ray, or None."""
+    ours, theirs = row.speed(kind), baseline.speed(kind)
+    return ours.median / theirs.median if ours and theirs and theirs.median else None
+
+
+def csv_record(row: Row) -> dict[str, Any]:
+    """The row's line of the CSV file: column name to value, None where there is none."""
+    tree = asdict(row.tree) if row.tree else {}
+    errors = row.errors()
+    names = ("name", "label", "system", "builder", "branching", "reorder", "device", "threads")
+    record: dict[str, Any] = {name: getattr(row, name) for name in names}
+    for name in (
+        "nodes",
+        "leaves",
+        "references",
+        "max_depth",
+        "average_leaf_size",
+        "bytes",
+        "cost",
+    ):
+        record[name] = tree.get(name)
+    for name in ("build_seconds", "tree_seconds", "collapse_seconds"):
+        seconds = getattr(row, name)
+        record[name] = spread(seconds).median if seconds else None
+    for kind in KINDS:
+        speed = row.speed(kind)
+        for i, part in enumerate(("_low", "", "_high")):
+            record[f"{kind}_mrays_per_second{part}"] = speed[i] if speed else None
+    for counter in ("node_visits", "triangle_tests"):
+        for kind in KINDS:
+            record[f"{kind}_{counter}_per_ray"] = row.per_ray(counter, kind)
+    for name in ("judged", "wrong", "false_misses", "false_hits", "wrong_triangles"):
+        record[f"{name}_rays"] = getattr(errors, name)
+    record["largest_relative_t_error"] = errors.largest_t_error
+    record["differing_rays"] = row.differing_rays()
+    record["largest_picture_difference"] = row.picture_difference()
+    record["error"] = row.error
+    return record

@@ -1,0 +1,387 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Run a plan on a scene: build every variant, trace the same rays with each, judge, render, count.
+
+Variants are timed interleaved, so that a machine that slows down slows all alike. Their trees are
+held at once for that; where they do not fit in the memory allowed, the variants are measured in
+groups, one after the other, and the result says so.
+"""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from ..native import load
+from .contenders import (
+    EMBREE_BYTES_PER_TRIANGLE,
+    EMBREE_MODES,
+    Contender,
+    EmbreeMode,
+    EmbreeTree,
+    OurTree,
+    TreeJob,
+    embree_row,
+    record_build,
+    tree_jobs,
+)
+from .estimate import Estimate
+from .judge import Answers, Judge, differing_rays, picture_difference
+from .machine import describe_machine, free_bytes
+from .plan import Plan
+from .progress import Event, Progress, RowChanged, Step
+from .rays import RaySet, View, choose_views, core_scene, generate_rays, judge_rays
+from .results import KINDS, Measurement, Picture, Result, Row, Subject
+from .scene import Float32Array, Scene
+
+__all__ = ["Event", "RowChanged", "Step", "Study", "compare"]
+
+
+@dataclass
+class Study:
+    """A result with the pictures, (variant name, view name) to (H, W, 3) float32 linear."""
+
+    result: Result
+    pictures: dict[tuple[str, str], Float32Array] = field(default_factory=dict)
+
+
+def compare(
+    scene: Scene,
+    plan: Plan,
+    token: Any = None,
+    on_event: Callable[[Event], None] | None = None,
+    host: str = "",
+) -> Study:
+    """Measure every variant of the plan on the scene; may be called in a worker thread.
+
+    ``token`` is a `core.Token`: after ``cancel()`` this returns within about 0.1 s with the rows
+    measured so far and ``result.cancelled`` set. ``on_event`` gets `Step` and `RowChanged` in the
+    calling thread. ``host`` names the program around, e.g. "Blender 3.4.1". A variant that fails
+    has its error in its row and the others go on. Raises NativeMissing without a core, and
+    ValueError for a bad plan or mesh.
+    """
+    core = load()
+    plan.check(core.builders(), core.devices())
+    token = core.Token() if token is None else token
+    return _Runner(core, scene, plan, token, on_event or (lambda event: None), host).run()
+
+
+class _Runner:
+    def __init__(
+        self,
+        core: ModuleType,
+        scene: Scene,
+        plan: Plan,
+        token: Any,
+        emit: Callable[[Event], None],
+        host: str,
+    ) -> None:
+        self.core, self.plan, self.token, self.emit = core, plan, token, emit
+        self.mesh = core.Mesh(scene.vertices, scene.triangles)
+        self.scene = core_scene(core, self.mesh, scene)
+        self.views = choose_views(core, scene, plan)
+        self.jobs = tree_jobs(core, plan)
+        self.modes = EMBREE_MODES if plan.embree else ()
+        self.group = 1
+        self.guess = Estimate(plan, len(scene.triangles), self.views)
+        rows = [row for job in self.jobs for row in job.rows]
+        rows += [embree_row(core, mode, plan) for mode in self.modes]
+        builds = [job.builder for job in self.jobs] + ["embree"] * len(self.modes)
+        self.progress = Progress(self.guess.planned(rows, builds), emit)
+        self.study = Study(
+            Result(
+                plan=copy.deepcopy(plan),
+                subject=_subject(scene, self.views),
+                machine=describe_machine(core, host),
+                started=datetime.now(UTC).isoformat(timespec="seconds"),
+                notes=[plan.preset_note(), *scene.notes],
+            )
+        )
+
+    @property
+    def result(self) -> Result:
+        return self.study.result
+
+    def run(self) -> Study:
+        start = time.perf_counter()
+        try:
+            self._measure_everything()
+        except self.core.Cancelled:
+            self.result.cancelled = True
+            self.result.notes.append("Stopped early: rows hold what was measured until then.")
+        self._note_what_is_missing()
+        self.result.seconds = time.perf_counter() - start
+        return self.study
+
+    def _measure_everything(self) -> None:
+        budget = self.plan.memory_gib * 2**30 or free_bytes() / 2.0
+        held: list[Contender] = []
+        for build in self._builds():
+            largest = max((contender.bytes for contender in held), default=0)
+            if held and sum(contender.bytes for contender in held) + largest > budget:
+                self._measure(held)
+                held = []
+                self.group += 1
+            held += build()
+        self._measure(held)
+
+    def _builds(self) -> Iterator[Callable[[], Sequence[Contender]]]:
+        for job in self.jobs:
+            yield lambda job=job: self._build_tree(job)  # type: ignore[misc]
+        for mode in self.modes:
+            yield lambda mode=mode: self._build_embree(mode)  # type: ignore[misc]
+
+    def _build_tree(self, job: TreeJob) -> list[Contender]:
+        plan, bvh = self.plan, None
+        self._enter(job.rows)
+        with self._failing_alone(job.rows):
+            for _ in range(plan.build_repeats):
+                bvh = None  # two trees of the largest scenes need not fit
+                guess = self.guess.build(job.builder)
+                with self.progress.step(f"build {job.builder}", guess, job.stage):
+                    bvh = self.core.build(
+                        self.mesh,
+                        job.builder,
+                        branching=job.branching,
+                        device=job.device,
+                        threads=plan.threads,
+                        params=plan.params.get(job.builder, {}),
+                        traversal=plan.traversal,
+                        intersection=plan.intersection,
+                        token=self.token,
+                    )
+                record_build(job, bvh, plan)
+            assert bvh is not None
+            bvh.validate()
+        return self._started([OurTree(self.core, row, bvh, plan) for row in job.rows])
+
+    def _build_embree(self, mode: EmbreeMode) -> list[Contender]:
+        row, scene = embree_row(self.core, mode, self.plan), None
+        self._enter([row])
+        if not row.error:
+            with self._failing_alone([row]):
+                for _ in range(self.plan.build_repeats):
+                    scene = None
+                    guess = self.guess.build("embree")
+                    with self.progress.step("build embree", guess, f"building {row.label}"):
+                        scene = self.core.EmbreeScene(
+                            self.mesh,
+                            quality=mode.quality,
+                            robust=mode.robust,
+                            threads=self.plan.threads,
+                        )
+                    row.build_seconds.append(scene.build_seconds)
+                    self._stop_if_cancelled()
+        size = EMBREE_BYTES_PER_TRIANGLE * self.result.subject.triangles
+        return self._started([EmbreeTree(row, scene, self.plan, size)])
+
+    def _enter(self, rows: list[Row]) -> None:
+        """Put rows in the result as their work begins, so that a cancel keeps them."""
+        for row in rows:
+            row.group = self.group
+        self.result.rows += rows
+
+    def _started(self, contenders: Sequence[Contender]) -> list[Contender]:
+        """Announce freshly built rows and give back those that did not fail."""
+        for contender in contenders:
+            failed = bool(contender.row.error)
+            self.emit(RowChanged(copy.deepcopy(contender.row), finished=failed))
+            if failed:
+                self.progress.skip(self.guess.measure(contender.row))
+        return [contender for contender in contenders if not contender.row.error]
+
+    def _measure(self, contenders: list[Contender]) -> None:
+        """Everything about a group of contenders, view by view."""
+        for view in self.views:
+            ours = [c for c in contenders if isinstance(c, OurTree) and not c.row.error]
+            if not view.sets and not any(self._prepare(view, tree) for tree in ours):
+                continue
+            for rays in view.sets:
+                self._answer(view, rays, contenders)
+            self._time(view, contenders)
+            if self.plan.pictures:
+                self._render(view, ours)
+            for contender in contenders:
+                finished = view is self.views[-1]
+                self.emit(RowChanged(copy.deepcopy(contender.row), finished))
+
+    def _prepare(self, view: View, tree: OurTree) -> bool:
+        """Generate the view's rays with one tree; False where that failed (its row says why)."""
+        with self._failing_alone([tree.row]):
+            with self.progress.step("trace", 0.0, f"generating the rays of view {view.name}"):
+                generate_rays(self.core, self.scene, view, tree.bvh, self.plan, self.token)
+            for number, rays in enumerate(view.sets):
+                stage = f"brute force on {rays.kind} rays of view {view.name}"
+                with self.progress.step("judge", self.guess.judge(), stage):
+                    seed = 3 * self.views.index(view) + number
+                    judge_rays(self.core, self.mesh, rays, self.plan, seed, self.token)
+            if not self.result.reference:
+                self.result.reference = tree.row.name
+        if tree.row.error:
+            view.sets = []
+        return bool(view.sets)
+
+    def _answer(self, view: View, rays: RaySet, contenders: Sequence[Contender]) -> None:
+        """One untimed run of each contender, the warm-up: are the answers right and the same?"""
+        for contender in contenders:
+            row = contender.row
+            if row.error:
+                continue
+            with self._failing_alone([row]):
+                stage = f"checking {rays.kind} rays of view {view.name}: {_title(row)}"
+                with self._trace_step(view, stage):
+                    hit = contender.trace(rays, False, self.token)
+                row.measurements.append(self._judged(view, rays, Answers.of(hit), row))
+                if isinstance(contender, OurTree):
+                    with self._trace_step(view, stage.replace("checking", "counting the work of")):
+                        counted = contender.trace(rays, True, self.token)
+                    measurement = row.measurements[-1]
+                    measurement.node_visits = int(counted.node_visits.sum(dtype=np.uint64))
+                    measurement.triangle_tests = int(counted.triangle_tests.sum(dtype=np.uint64))
+
+    def _judged(self, view: View, rays: RaySet, answers: Answers, row: Row) -> Measurement:
+        if rays.reference is None:
+            rays.reference = answers
+        measurement = Measurement(
+            view.name,
+            rays.kind,
+            len(rays),
+            hits=int(answers.occluded.sum()),
+            hits_sha256=answers.sha256(),
+        )
+        if row.system == "bvh_lab":
+            measurement.differing_rays = differing_rays(answers, rays.reference)
+        else:  # a rival rounds otherwise: bits may differ where the hit does not
+            ours = Judge(
+                self.mesh.vertices,
+                self.mesh.triangles,
+                rays.origins,
+                rays.directions,
+                rays.reference,
+            )
+            measurement.differing_rays = ours.errors(answers).wrong
+        if rays.judge is not None:
+            measurement.errors = rays.judge.errors(answers.sample(rays.sampled))
+        return measurement
+
+    def _time(self, view: View, contenders: Sequence[Contender]) -> None:
+        """The timed repeats, interleaved; who begins changes from repeat to repeat."""
+        for repeat in range(self.plan.repeats):
+            first = repeat % max(len(contenders), 1)
+            for contender in [*contenders[first:], *contenders[:first]]:
+                row = contender.row
+                if row.error:
+                    continue
+                stage = (
+                    f"timing view {view.name}, {repeat + 1} of {self.plan.repeats}: {_title(row)}"
+                )
+                with self._failing_alone([row]):
+                    for rays in view.sets:
+                        with self._trace_step(view, stage):
+                            hit = contender.trace(rays, False, self.token)
+                        _record_time(row, view, rays, hit)
+                        self._stop_if_cancelled()
+
+    def _render(self, view: View, trees: Sequence[OurTree]) -> None:
+        for tree in trees:
+            row = tree.row
+            if row.error:
+                continue
+            stage = f"picture of view {view.name}: {_title(row)}"
+            with self._failing_alone([row]):
+                with self.progress.step("render", self.guess.render(view), stage):
+                    picture = tree.render(self.scene, view, self.token)
+                self._keep_picture(view, row, picture)
+
+    def _keep_picture(self, view: View, row: Row, picture: Any) -> None:
+        if view.picture is None:
+            view.picture = picture.pixels
+        pixels, reference = picture.pixels, view.picture
+        if np.array_equal(pixels.view(np.uint32), reference.view(np.uint32)):
+            pixels = reference  # equal ones share an array, so that hundreds take no memory
+        self.study.pictures[row.name, view.name] = pixels
+        difference = picture_difference(pixels, reference)
+        row.pictures.append(
+            Picture(
+                view.name,
+                view.width,
+                view.height,
+                self.plan.samples,
+                int(picture.rays),
+                float(picture.seconds),
+                largest_difference=float(difference.max()),
+                differing_pixels=int(difference.any(axis=2).sum()),
+            )
+        )
+
+    @contextmanager
+    def _failing_alone(self, rows: Sequence[Row]) -> Iterator[None]:
+        """A failure inside ends these rows, not the study."""
+        try:
+            yield
+        except self.core.Cancelled:
+            raise
+        except Exception as error:
+            for row in rows:
+                row.error = str(error) or type(error).__name__
+
+    def _stop_if_cancelled(self) -> None:
+        if self.token.cancelled:
+            raise self.core.Cancelled("cancelled")
+
+    @contextmanager
+    def _trace_step(self, view: View, stage: str) -> Iterator[None]:
+        with self.progress.step("trace", self.guess.trace(view), stage):
+            yield
+
+    def _note_what_is_missing(self) -> None:
+        notes, plan = self.result.notes, self.plan
+        if plan.width:
+            notes.append(
+                f"Pictures are {plan.width}x{plan.height} whatever the cameras' shape: each keeps "
+                "what it sees along its longer side."
+            )
+        if self.group > 1:
+            notes.append(
+                "The trees do not fit in memory together: variants were measured in "
+                f"{self.group} groups, and only within a group were they timed interleaved."
+            )
+        for view in self.views:
+            missing = set(KINDS) - {rays.kind for rays in view.sets}
+            if self.result.reference and not self.result.cancelled and missing:
+                kinds = " and ".join(sorted(missing))
+                notes.append(f"View {view.name} has no {kinds} rays: no primary ray hit anything.")
+
+
+def _subject(scene: Scene, views: Sequence[View]) -> Subject:
+    return Subject(
+        scene.name,
+        scene.source,
+        scene.geometry,
+        scene.frame,
+        len(scene.triangles),
+        len(scene.vertices),
+        len(scene.materials),
+        len(scene.lights),
+        [view.name for view in views],
+        scene.digest(),
+    )
+
+
+def _record_time(row: Row, view: View, rays: RaySet, hit: Any) -> None:
+    for measurement in row.measurements:
+        if measurement.view == view.name and measurement.kind == rays.kind:
+            measurement.key_seconds.append(hit.key_seconds)
+            measurement.sort_seconds.append(hit.sort_seconds)
+            measurement.traverse_seconds.append(hit.traverse_seconds)
+
+
+def _title(row: Row) -> str:
+    return f"{row.label} {row.branching}-wide" if row.branching else row.label

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The result for people, as text: the table, who was fastest, how it was measured, the notes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from .plan import Plan
+from .results import KINDS, Result, Row, Spread, ratio
+
+MISSING = "-"  # in a cell without a value
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of the table: two header lines and the text of a row's cell."""
+
+    title: str
+    unit: str
+    cell: Callable[[Row], str]
+    left: bool = False  # aligned; numbers stand right
+
+
+def columns(rows: Sequence[Row]) -> list[Column]:
+    """The columns that these rows need, in the order of the table."""
+    chosen = [
+        Column("builder", "", lambda row: row.label, left=True),
+        Column("branching", "factor", lambda row: str(row.branching or MISSING)),
+    ]
+    if any(row.reorder for row in rows):
+        chosen.append(Column("rays", "reordered", lambda row: "yes" if row.reorder else "no"))
+    if len({row.device for row in rows}) > 1:
+        chosen.append(Column("device", "", lambda row: row.device, left=True))
+    for title, unit, name in (
+        ("nodes", "", "nodes"),
+        ("leaves", "", "leaves"),
+        ("references", "", "references"),
+        ("depth", "levels", "max_depth"),
+    ):
+        chosen.append(Column(title, unit, _tree_number(name)))
+    chosen += [
+        Column("size", "MB", lambda row: f"{row.tree.bytes / 1e6:.1f}" if row.tree else MISSING),
+        Column("build", "ms", _build),
+        Column("BVH cost", "", lambda row: f"{row.tree.cost:.1f}" if row.tree else MISSING),
+    ]
+    chosen += [Column(kind, "MRays/s", _speed(kind)) for kind in KINDS]
+    for counter, unit in (("node_visits", "visits"), ("triangle_tests", "tests")):
+        chosen += [Column(kind, unit, _per_ray(counter, kind)) for kind in KINDS]
+    return [
+        *chosen,
+        Column("wrong", "hits", _wrong),
+        Column("differing", "rays", lambda row: _optional(row.differing_rays(), ",d")),
+        Column("picture", "difference", lambda row: _optional(row.picture_difference(), ".3g")),
+    ]
+
+
+def _tree_number(name: str) -> Callable[[Row], str]:
+    return lambda row: f"{getattr(row.tree, name):,d}" if row.tree else MISSING
+
+
+def _build(row: Row) -> str:
+    seconds = row.build()
+    return _with_spread(seconds and Spread(*(1e3 * s for s in seconds)), 1, len(row.build_seconds))
+
+
+def _speed(kind: str) -> Callable[[Row], str]:
+    def cell(row: Row) -> str:
+        repeats = min((len(m.seconds) for m in row.of_kind(kind)), default=0)
+        return _with_spread(row.speed(kind), 2, repeats)
+
+    return cell
+
+
+def _per_ray(counter: str, kind: str) -> Callable[[Row], str]:
+    return lambda row: _optional(row.per_ray(counter, kind), ".1f")
+
+
+def _wrong(row: Row) -> str:
+    errors = row.errors()
+    return f"{errors.wrong}/{errors.judged}" if errors.judged else MISSING
+
+
+def _optional(value: float | None, style: str) -> str:
+    return MISSING if value is None else format(value, style)
+
+
+def _with_spread(value: Spread | None, digits: int, repeats: int) -> str:
+    """The median and, unless it was measured once only, its spread."""
+    if value is None:
+        return MISSING
+    said = f"±{value.half_percent:2.0f}%" if repeats > 1 else "once"
+    return f"{value.median:.{digits}f} {said}"
+
+
+def text_table(rows: Sequence[Row], width: int | None = None) -> str:
+    """The aligned table, in as many blocks as it takes to stay within ``width`` characters.
+
+    Each block begins with builder and branching factor; without ``width`` there is one.
+    """
+    chosen = columns(rows)
+    cells = [[c.title, c.unit, *(c.cell(row) for row in rows)] for c in chosen]
+    widths = [max(len(text) for text in column) for column in cells]
+    blocks = []
+    for block in _blocks(widths, width):
+        lines = []
+        for i in range(len(rows) + 2):
+            parts = (
+                f"{cells[c][i]:<{widths[c]}}" if chosen[c].left else f"{cells[c][i]:>{widths[c]}}"
+                for c in block
+            )
+            lines.append("  ".join(parts).rstrip())
+        rule = "-" * (sum(widths[c] for c in block) + 2 * (len(block) - 1))
+        blocks.append("\n".join([*lines[:2], rule, *lines[2:]]))
+    return "\n\n".join(blocks) + "\n"
+
+
+def _blocks(widths: Sequence[int], width: int | None) -> list[list[int]]:
+    """Columns of each block: as many as fit beside the two that name the row."""
+    names = [0, 1]
+    blocks = [list(names)]
+    for column in range(len(names), len(widths)):
+        used = sum(widths[c] + 2 for c in blocks[-1]) + widths[column]
+        if width is not None and used > width and len(blocks[-1]) > len(names):
+            blocks.append(list(names))
+        blocks[-1].append(column)
+    return blocks
+
+
+def title(row: Row) -> str:
+    """A row in words, e.g. "SBVH 8-wide, reordered"."""
+    name = f"{row.label} {row.branching}-wide" if row.branching else row.label
+    return f"{name}, reordered" if row.reorder else name
+
+
+def fastest(result: Result) -> list[str]:
+    """Who was fastest for each kind of ray, with the spread and the error beside it."""
+    lines = []
+    for kind in KINDS:
+        timed = [(speed, row) for row in result.rows if (speed := row.speed(kind))]
+        ours = [(speed, row) for speed, row in timed if row.system == "bvh_lab"]
+        if not ours:
+            continue
+        speed, best = max(ours, key=lambda pair: pair[0].median)
+        rivals = [
+            f"{ratio(best, row, kind):.2f} times {title(row)}"
+            for _, row in timed
+            if row.system != "bvh_lab"
+        ]
+        errors = best.errors()
+        said = [
+            f"{speed.median:.2f} MRays/s ±{speed.half_percent:.0f}%",
+            *rivals,
+            f"{errors.wrong} of {errors.judged} judged rays wrong",
+        ]
+        lines.append(f"Fastest of ours for {kind} rays: {title(best)}, {', '.join(said)}.")
+    return lines
+
+
+def method(plan: Plan) -> list[str]:
+    """What was measured and how, a sentence each."""
+    judged = f"{plan.judged_rays} rays of each view and kind"
+    builds = f"median of {plan.build_repeats} builds" if plan.build_repeats > 1 else "one build"
+    return [
+        f"Speed: median of {plan.repeats} timed runs after a warm-up, all variants interleaved; "
+        "rays of all views over the sum of the views' median seconds. ± is half the distance "
+        "between the quartiles. Sort keys, sorting and traversal are included, generating the rays "
+        "is not.",
+        "Primary rays: closest hit, one through the centre of each pixel. Shadow rays: any hit, "
+        "one from each primary hit to a sampled light, or to the sky where there is no light. "
+        "Diffuse rays: closest hit, one in a random cosine-weighted direction from each primary "
+        "hit.",
+        "Visits and tests: interior nodes visited and triangles tested, per ray, counted in a run "
+        "of their own.",
+        f"Build: {builds}, binary tree and collapse together.",
+        "BVH cost: Eq. 2 (binary) and 3 (wide) of Meister & Bittner 2022 with c_T = "
+        f"{plan.traversal:g}, c_I = {plan.intersection:g}.",
+        f"Wrong hits: against brute force in double precision on {judged}; equal distances (within "
+        "4 float32 ulp) are no error. Differing rays: against the first variant, bit for bit, over "
+        "all rays; for Embree by the rule for wrong hits.",
+        f"Picture: primary rays with direct light and shadow rays, {plan.samples} samples per "
+        "pixel; the difference is the largest of any channel (linear) to the first variant's.",
+    ]
+
+
+def failures(result: Result) -> list[str]:
+    """One line per failed row."""
+    lines = []
+    for row in result.failed():
+        reason = row.error or (
+            f"answers differ from {result.reference}: {row.differing_rays()} rays, largest "
+            f"picture difference {_optional(row.picture_difference(), '.3g')}; please report it"
+        )
+        lines.append(f"{title(row)}: {reason}")
+    return lines
+
+
+def header(result: Result) -> list[str]:
+    """Scene and machine, a line each."""
+    scene, machine = result.subject, result.machine
+    threads = max((row.threads for row in result.rows), default=0)
+    return [
+        f"Scene {scene.name}: {scene.triangles:,d} triangles ({scene.geometry} geometry), "
+        f"{len(scene.views)} views ({', '.join(scene.views)}).",
+        f"{machine.host} with BVH Lab {machine.version}; {machine.cpu}, {threads} threads.",
+    ]
+
+
+def text_report(result: Result, width: int | None = None) -> str:
+    """Table, failures, the fastest, method and notes, as plain text."""
+    sections = [header(result), [text_table(result.rows, width).rstrip()]]
+    if result.failed():
+        sections.append([f"FAILED  {line}" for line in failures(result)])
+    sections += [fastest(result), _bullets("How it was measured", method(result.plan))]
+    sections.append(_bullets("Modelled, approximated, left out", result.notes))
+    return "\n\n".join("\n".join(section) for section in sections if section) + "\n"
+
+
+def _bullets(heading: str, lines: Iterable[str]) -> list[str]:
+    listed = [f"  - {line}" for line in lines]
+    return [f"{heading}:", *listed] if listed else []

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel as a user meets it: in a window, under Xvfb, driven by mouse and keyboard."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+BUILD = Path(os.environ.get("BVHLAB_BUILD", REPOSITORY / "build"))
+SCRIPT = Path(__file__).with_name("panel_in_blender.py")
+BLENDER = shutil.which("blender", path="/usr/bin")
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory: pytest.TempPathFactory) -> dict:
+    """What the script saw; its folder, with the screenshots, stands under "folder"."""
+    folder = Path(os.environ.get("BVHLAB_SCREENSHOTS") or tmp_path_factory.mktemp("panel"))
+    command = ["xvfb-run", "-a", "-s", "-screen 0 1280x900x24", str(BLENDER), "--factory-startup"]
+    command += ["-noaudio", "--enable-event-simulate", "--window-geometry", "0", "0", "1280", "900"]
+    command += ["--python-exit-code", "1", "--python", str(SCRIPT), "--", str(BUILD), str(folder)]
+    environment = {
+        **os.environ,
+        "LIBGL_ALWAYS_SOFTWARE": "1",
+        "BLENDER_USER_RESOURCES": str(folder),
+    }
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
+    assert (folder / "seen.json").is_file(), f"{run.returncode}\n{run.stdout}\n{run.stderr}"
+    seen = json.loads((folder / "seen.json").read_text())
+    assert "error" not in seen, f"{seen['error']}\nscreenshots: {folder}"
+    assert run.returncode == 0, run.stderr
+    assert "Traceback" not in run.stdout + run.stderr, run.stdout + run.stderr
+    return {**seen, "folder": folder}
+
+
+def test_progress_while_it_runs(seen: dict) -> None:
+    assert 0.0 < seen["progress"] < 1.0
+
+
+def test_escape_stops_and_keeps_rows(seen: dict) -> None:
+    assert seen["cancelled"]
+    assert seen["rows_kept"] >= 2
+    assert seen["seconds_to_stop"] < 5.0
+
+
+def test_table_holds_every_variant(seen: dict) -> None:
+    ours = [f"{builder}_{k}" for builder in ("lbvh", "sah", "sbvh") for k in (2, 4, 8)]
+    assert [name for name in seen["rows"] if not name.startswith("embree")] == ours
+    assert seen["failures"] == []
+
+
+def test_render_geometry_with_a_window(seen: dict) -> None:
+    assert seen["geometry"] == "render"
+    assert seen["scenes_left_over"] == 0
+
+
+def test_winner_is_said_with_its_error(seen: dict) -> None:
+    assert seen["said"][0].startswith("Fastest: ")
+    assert "wrong hits of" in seen["said"][0]
+
+
+def test_picture_is_in_the_image_editor(seen: dict) -> None:
+    name, width, height = seen["image"]
+    assert name == "BVH Lab Camera"
+    assert max(width, height) == 128
+
+
+def test_screenshots(seen: dict) -> None:
+    pictures = sorted(path.name for path in seen["folder"].glob("*.png"))
+    assert [name[0] for name in pictures] == ["1", "2", "3", "4", "5"]
