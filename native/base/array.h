@@ -10,8 +10,8 @@
 
 namespace bvhlab {
 
-/// Allocator that leaves new elements of trivial type uninitialised: large arrays are first touched by
-/// the threads that fill them, not zeroed by one. Memory is aligned to a cache line.
+/// Allocator that leaves new elements of trivial type uninitialised: large arrays are first touched
+/// by the threads that fill them, not zeroed by one. Memory is aligned to a cache line.
 template <class T>
 struct UninitialisedAllocator : tbb::cache_aligned_allocator<T> {
     static_assert(std::is_trivially_destructible_v<T>);

@@ -13,11 +13,17 @@ namespace bvhlab {
 namespace {
 
 const BuilderInfo all_builders[] = {
-    {"lbvh", "LBVH", "Karras 2012, 60-bit Morton codes", {},
+    {"lbvh",
+     "LBVH",
+     "Karras 2012, 60-bit Morton codes",
+     {},
      [](const Mesh& mesh, const CostModel&, const Parameters&, Token& token) {
          return build_lbvh(mesh, token);
      }},
-    {"sah", "SAH", "full sweep, top-down; Wald 2007", {},
+    {"sah",
+     "SAH",
+     "full sweep, top-down; Wald 2007",
+     {},
      [](const Mesh& mesh, const CostModel& model, const Parameters&, Token& token) {
          return build_sah(mesh, model, token);
      }},
@@ -46,7 +52,9 @@ void check_value(const BuilderInfo& builder, const ParameterInfo& info, double v
 
 }  // namespace
 
-std::span<const BuilderInfo> builders() { return all_builders; }
+std::span<const BuilderInfo> builders() {
+    return all_builders;
+}
 
 const BuilderInfo& find_builder(std::string_view id) {
     std::string known;

@@ -11,14 +11,17 @@
 
 namespace bvhlab {
 
-/// Elements that one task handles in a parallel pass over the references of a large node. Smaller nodes are
-/// handled by one thread. Trees do not depend on this number.
+/// Elements that one task handles in a parallel pass over the references of a large node. Smaller
+/// nodes are handled by one thread. Trees do not depend on this number.
 inline constexpr std::size_t chunk_size = 4096;
 
-inline std::size_t chunk_count(std::size_t count) { return (count + chunk_size - 1) / chunk_size; }
+inline std::size_t chunk_count(std::size_t count) {
+    return (count + chunk_size - 1) / chunk_size;
+}
 
-/// Calls `body(begin, end)` for each chunk of [0, count), in parallel where there are several, and checks
-/// the token before each. A thread that waits here takes up no other node's work, so that stacks stay shallow.
+/// Calls `body(begin, end)` for each chunk of [0, count), in parallel where there are several, and
+/// checks the token before each. A thread that waits here takes up no other node's work, so that
+/// stacks stay shallow.
 template <class Body>
 void for_chunks(std::size_t count, const Token& token, Body&& body) {
     if (count <= chunk_size) {

@@ -23,7 +23,9 @@ float round_down(double value) {
                : std::nextafter(nearest, -std::numeric_limits<float>::infinity());
 }
 
-float round_up(double value) { return -round_down(-value); }
+float round_up(double value) {
+    return -round_down(-value);
+}
 
 }  // namespace
 
@@ -56,8 +58,7 @@ Box padded_box(const Box& part, const Box& whole) {
     for (int axis = 0; axis < 3; ++axis) {
         const double size =
             std::max(std::abs(double(whole.lower[axis])), std::abs(double(whole.upper[axis])));
-        const double pad =
-            std::max(0x1.8p-22 * size, double(std::numeric_limits<float>::min()));
+        const double pad = std::max(0x1.8p-22 * size, double(std::numeric_limits<float>::min()));
         box.lower[axis] = std::max(whole.lower[axis], round_down(double(part.lower[axis]) - pad));
         box.upper[axis] = std::min(whole.upper[axis], round_up(double(part.upper[axis]) + pad));
     }

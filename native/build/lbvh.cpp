@@ -12,10 +12,11 @@
 namespace bvhlab {
 namespace {
 
-constexpr std::uint32_t smallest_task = 4096;  // references below which a subtree is built in one go
+constexpr std::uint32_t smallest_task =
+    4096;  // references below which a subtree is built in one go
 
-/// Length of the common prefix of the codes at two places of the sorted order; equal codes are extended by
-/// the places themselves (Karras 2012, section 4).
+/// Length of the common prefix of the codes at two places of the sorted order; equal codes are
+/// extended by the places themselves (Karras 2012, section 4).
 int common_prefix(const Array<std::uint64_t>& codes, std::uint32_t i, std::uint32_t j) {
     const std::uint64_t difference = codes[i] ^ codes[j];
     return difference != 0 ? std::countl_zero(difference) : 64 + std::countl_zero(i ^ j);
@@ -33,8 +34,8 @@ std::uint32_t find_split(const Array<std::uint64_t>& codes, std::uint32_t first,
     return low;
 }
 
-/// Builds the subtrees of Karras' tree, boxes on the way up. A subtree over the references first..last has its
-/// last - first interior nodes at node, node + 1, ... in depth-first order.
+/// Builds the subtrees of Karras' tree, boxes on the way up. A subtree over the references
+/// first..last has its last - first interior nodes at node, node + 1, ... in depth-first order.
 struct SubtreeBuilder {
     const Array<std::uint64_t>& codes;
     BinaryBvh& bvh;

@@ -23,8 +23,8 @@ constexpr std::uint64_t spread_by_three(std::uint64_t value) {
     return value;
 }
 
-/// Maps points of a box to cells of a grid of 2^20 cells per axis, and cells to their place on the Morton
-/// curve. Every axis of the box is stretched to the whole grid; a flat axis maps to cell 0.
+/// Maps points of a box to cells of a grid of 2^20 cells per axis, and cells to their place on the
+/// Morton curve. Every axis of the box is stretched to the whole grid; a flat axis maps to cell 0.
 class MortonGrid {
 public:
     explicit MortonGrid(const Box& box) : lower_(box.lower) {

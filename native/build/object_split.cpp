@@ -32,7 +32,8 @@ bool all_centres_equal(const ReferenceView& node) {
     return true;
 }
 
-/// Asks for the reference that a pass over an order needs a little later: large nodes exceed the caches.
+/// Asks for the reference that a pass over an order needs a little later: large nodes exceed the
+/// caches.
 void prefetch(const Reference* references, Order order, std::size_t i) {
     if (i < order.size()) __builtin_prefetch(references + order[i]);
 }
@@ -65,7 +66,8 @@ struct Stretch {
     Box before, after;
 };
 
-/// Improves `best` by the splits behind each reference of one stretch of at most chunk_size references.
+/// Improves `best` by the splits behind each reference of one stretch of at most chunk_size
+/// references.
 void sweep(const ReferenceView& node, int axis, const Stretch& stretch, ObjectSplit& best) {
     const Order order = node.orders[std::size_t(axis)];
     const Reference* references = node.references.data();

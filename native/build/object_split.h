@@ -28,9 +28,9 @@ struct ObjectSplit {
     std::size_t left_size = 0;
 };
 
-/// The division of least cost among all 3 (n - 1), for n >= 2 references. Equal costs are decided by the more
-/// even sizes, then axis x before y before z, then the smaller left side. References whose centres are all the
-/// same are divided evenly.
+/// The division of least cost among all 3 (n - 1), for n >= 2 references. Equal costs are decided
+/// by the more even sizes, then axis x before y before z, then the smaller left side. References
+/// whose centres are all the same are divided evenly.
 ObjectSplit find_object_split(const ReferenceView& node, const Token& token);
 
 /// Boxes of the two sides.

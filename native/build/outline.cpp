@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Compiled once per instruction set by Highway; the best one for the processor is taken at run time.
+// Compiled once per instruction set by Highway; the best one for the processor is taken at run
+// time.
 #include "build/outline.h"
 
 #include <hwy/base.h>

@@ -22,9 +22,9 @@ std::size_t digit_of(Key key, int shift) {
     return std::size_t(key >> shift) & (digit_count - 1);
 }
 
-/// Turns counts by block and digit into the place where each block writes its first key of each digit:
-/// all smaller digits first, then the same digit of earlier blocks, which keeps the sort stable.
-/// Returns false where all keys share one digit, so that the pass can be skipped.
+/// Turns counts by block and digit into the place where each block writes its first key of each
+/// digit: all smaller digits first, then the same digit of earlier blocks, which keeps the sort
+/// stable. Returns false where all keys share one digit, so that the pass can be skipped.
 bool places_from_counts(std::vector<Counts>& blocks, std::size_t key_count) {
     std::uint32_t place = 0;
     for (std::size_t digit = 0; digit < digit_count; ++digit) {

@@ -15,11 +15,13 @@ namespace bvhlab {
 struct Reference {
     Box box;  ///< of the part, not padded (see clip.h)
     std::uint32_t triangle;
-    std::uint32_t splittable;  ///< 0 where a spatial split must not cut it: the triangle has no area
+    std::uint32_t
+        splittable;  ///< 0 where a spatial split must not cut it: the triangle has no area
 };
 static_assert(sizeof(Reference) == 32);
 
-/// The references of one node, and their positions in `references` by ascending box centre on each axis.
+/// The references of one node, and their positions in `references` by ascending box centre on each
+/// axis.
 struct ReferenceView {
     std::span<const Reference> references;
     std::array<std::span<const std::uint32_t>, 3> orders;
@@ -33,8 +35,8 @@ struct ReferenceTarget {
     std::array<std::span<std::uint32_t>, 3> orders;
 };
 
-/// Storage for the references of one node, or of several one after the other; each node's orders count from
-/// its own first reference.
+/// Storage for the references of one node, or of several one after the other; each node's orders
+/// count from its own first reference.
 struct ReferenceSet {
     Array<Reference> references;
     std::array<Array<std::uint32_t>, 3> orders;

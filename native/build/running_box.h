@@ -8,8 +8,9 @@
 
 namespace bvhlab {
 
-/// A box that grows by one reference after the other, as two vectors of four floats (a language extension of GCC and
-/// Clang, one instruction each on every 64-bit processor). The fourth lanes hold nothing of use.
+/// A box that grows by one reference after the other, as two vectors of four floats (a language
+/// extension of GCC and Clang, one instruction each on every 64-bit processor). The fourth lanes
+/// hold nothing of use.
 class RunningBox {
 public:
     RunningBox() = default;  // not initialised

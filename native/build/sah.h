@@ -8,12 +8,13 @@
 
 namespace bvhlab {
 
-/// Full sweep (Wald 2007, section 3): top-down, each node divided where the surface area heuristic is least over
-/// all places in the orders of the box centres on three axes, down to single references. The orders are
-/// sorted once and divided stably from then on.
+/// Full sweep (Wald 2007, section 3): top-down, each node divided where the surface area heuristic
+/// is least over all places in the orders of the box centres on three axes, down to single
+/// references. The orders are sorted once and divided stably from then on.
 ///
-/// The division does not depend on the constants of `model`: these decide on leaves, in the collapse.
-/// Nodes are numbered depth-first; the tree is the same for any thread count. Throws Cancelled.
+/// The division does not depend on the constants of `model`: these decide on leaves, in the
+/// collapse. Nodes are numbered depth-first; the tree is the same for any thread count. Throws
+/// Cancelled.
 BinaryBvh build_sah(const Mesh& mesh, const CostModel& model, Token& token);
 
 }  // namespace bvhlab

@@ -7,7 +7,8 @@
 
 namespace bvhlab {
 
-/// Settings of build_sbvh; the defaults are the paper's. Each is a parameter of the builder of the same name.
+/// Settings of build_sbvh; the defaults are the paper's. Each is a parameter of the builder of the
+/// same name.
 struct SbvhConfig {
     double alpha = 1e-5;
     int spatial_bins = 128;
@@ -37,11 +38,13 @@ inline constexpr std::array<ParameterInfo, 5> sbvh_parameters{{
 /// The settings in checked parameters (check_parameters).
 SbvhConfig sbvh_config(const Parameters& parameters);
 
-/// Spatial splits in BVHs (Stich, Friedrich, Dietrich 2009): as build_sah, but where the children of a node would
-/// overlap, references may be cut at a plane and go to both children, if that costs less.
+/// Spatial splits in BVHs (Stich, Friedrich, Dietrich 2009): as build_sah, but where the children
+/// of a node would overlap, references may be cut at a plane and go to both children, if that costs
+/// less.
 ///
-/// Every triangle stays referenced. Boxes of parts are padded so that no hit falls between them (clip.h).
-/// Nodes are numbered depth-first; the tree is the same for any thread count. Throws Cancelled.
+/// Every triangle stays referenced. Boxes of parts are padded so that no hit falls between them
+/// (clip.h). Nodes are numbered depth-first; the tree is the same for any thread count. Throws
+/// Cancelled.
 BinaryBvh build_sbvh(const Mesh& mesh, const CostModel& model, const SbvhConfig& config,
                      Token& token);
 

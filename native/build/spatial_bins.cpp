@@ -18,14 +18,14 @@ constexpr float infinity = std::numeric_limits<float>::infinity();
 /// The corners of a triangle in ascending order of position.
 struct Profile {
     double positions[3];
-    double inverses[3];  ///< of the lengths of edges 0-1, 1-2, 0-2; 0 for edges too steep to be lines
+    double
+        inverses[3];  ///< of the lengths of edges 0-1, 1-2, 0-2; 0 for edges too steep to be lines
 
     void measure() {
         constexpr double steepest = 1e-6;
         const double lengths[3] = {positions[1] - positions[0], positions[2] - positions[1],
                                    positions[2] - positions[0]};
-        for (int i = 0; i < 3; ++i)
-            inverses[i] = lengths[i] > steepest ? 1.0 / lengths[i] : 0.0;
+        for (int i = 0; i < 3; ++i) inverses[i] = lengths[i] > steepest ? 1.0 / lengths[i] : 0.0;
     }
 
     Line line(int edge, int corner, double a, double b) const {
@@ -47,6 +47,24 @@ struct Profile {
         const bool middle_is_above = b > a + (positions[1] - positions[0]) * (c - a) * inverses[2];
         if (middle_is_above) return {{whole, whole}, {before, after}};
         return {{before, after}, {whole, whole}};
+    }
+};
+
+/// Box of one side of a plane so far, the bins' own axis last.
+struct Side {
+    float lower[3] = {infinity, infinity, infinity};
+    float upper[3] = {-infinity, -infinity, -infinity};
+
+    void grow(int axis, float low, float high) {
+        lower[axis] = std::min(lower[axis], low);
+        upper[axis] = std::max(upper[axis], high);
+    }
+
+    double half_area() const {
+        const double x = double(upper[0]) - double(lower[0]);
+        const double y = double(upper[1]) - double(lower[1]);
+        const double z = double(upper[2]) - double(lower[2]);
+        return x * y + z * (x + y);
     }
 };
 
@@ -80,7 +98,9 @@ SpatialBins::Range SpatialBins::bins_of(const Reference& reference) const {
     return {bin_of(reference.box.lower[axis_]), bin_of(reference.box.upper[axis_])};
 }
 
-float SpatialBins::plane_below(int bin) const { return float(lower_ + width_ * bin); }
+float SpatialBins::plane_below(int bin) const {
+    return float(lower_ + width_ * bin);
+}
 
 void SpatialBins::count(const Reference& reference) {
     const auto [first, last] = bins_of(reference);
@@ -197,8 +217,8 @@ void SpatialBins::chop(const Reference& reference, const Triangle& triangle, Ran
         const int axis = other_axis(i);
         part.lowest = box.lower[axis];
         part.highest = box.upper[axis];
-        const Outline outline = profile.outline(corners[order[0]][axis], middle[axis],
-                                                corners[order[2]][axis]);
+        const Outline outline =
+            profile.outline(corners[order[0]][axis], middle[axis], corners[order[2]][axis]);
         grow_bins(outline, part, bins.last - bins.first + 1, lowers_[std::size_t(i)].data() + row,
                   uppers_[std::size_t(i)].data() + row);
         if (has_middle) {
@@ -217,27 +237,11 @@ void SpatialBins::merge_parts(const SpatialBins& other) {
 }
 
 void SpatialBins::find_split(std::size_t count, std::size_t budget, SpatialSplit& best) const {
-    /// Box of one side so far, the bins' own axis last. Cut references fill it up to the plane.
-    struct Side {
-        float lower[3] = {infinity, infinity, infinity};
-        float upper[3] = {-infinity, -infinity, -infinity};
-
-        void grow(int axis, float low, float high) {
-            lower[axis] = std::min(lower[axis], low);
-            upper[axis] = std::max(upper[axis], high);
-        }
-        double half_area() const {
-            const double x = double(upper[0]) - double(lower[0]);
-            const double y = double(upper[1]) - double(lower[1]);
-            const double z = double(upper[2]) - double(lower[2]);
-            return x * y + z * (x + y);
-        }
-    };
     const auto row_of = [&](int bin) { return std::size_t(bin - (planes_.first - 1)); };
     const auto own_lower = [&](int bin) { return begin_here_[std::size_t(bin)].lower(axis_); };
     const auto own_upper = [&](int bin) { return end_here_[std::size_t(bin)].upper(axis_); };
 
-    // Backwards: areas of the right sides.
+    // Backwards: costs of the right sides. One that holds cut references begins at the plane.
     std::array<double, most_spatial_bins> right_costs;
     Side right;
     std::size_t right_count = 0, whole = 0;
@@ -270,16 +274,15 @@ void SpatialBins::find_split(std::size_t count, std::size_t budget, SpatialSplit
         if (left_count == 0 || whole == count || duplicates > budget) continue;
         Side side = left;
         if (duplicates > 0) side.grow(2, infinity, plane_below(plane));
-        const double cost =
-            side.half_area() * double(left_count) + right_costs[std::size_t(plane)];
+        const double cost = side.half_area() * double(left_count) + right_costs[std::size_t(plane)];
         if (cost < best.cost) best = {cost, axis_, plane_below(plane)};
     }
 }
 
 namespace {
 
-/// Calls `visit(part, reference)` for all references with bins of the thread's own, copies of `bins`, and
-/// `merge(part)` for each of these in the end.
+/// Calls `visit(part, reference)` for all references with bins of the thread's own, copies of
+/// `bins`, and `merge(part)` for each of these in the end.
 template <class Visit, class Merge>
 void visit_in_parallel(const ReferenceView& node, const SpatialBins& bins, const Token& token,
                        Visit&& visit, Merge&& merge) {
@@ -294,8 +297,8 @@ void visit_in_parallel(const ReferenceView& node, const SpatialBins& bins, const
 }  // namespace
 
 SpatialSplit find_spatial_split(const ReferenceView& node, const Box& bounds, const Mesh& mesh,
-                                int bin_count, std::size_t budget, double limit,
-                                SpatialBins& bins, const Token& token) {
+                                int bin_count, std::size_t budget, double limit, SpatialBins& bins,
+                                const Token& token) {
     SpatialSplit best{limit};
     const auto count = [](SpatialBins& part, const Reference& r) { part.count(r); };
     const auto add = [&](SpatialBins& part, const Reference& r) { part.add(r, mesh); };
@@ -304,13 +307,13 @@ SpatialSplit find_spatial_split(const ReferenceView& node, const Box& bounds, co
         if (!(bounds.upper[axis] > bounds.lower[axis])) continue;
         bins.begin(bounds, axis, bin_count);
         if (is_large)
-            visit_in_parallel(node, SpatialBins(bins), token, count,
+            visit_in_parallel(node, bins, token, count,
                               [&](const SpatialBins& part) { bins.merge_counts(part); });
         else
             for (const Reference& reference : node.references) bins.count(reference);
         if (!bins.find_planes(node.size(), budget, best.cost)) continue;
         if (is_large)
-            visit_in_parallel(node, SpatialBins(bins), token, add,
+            visit_in_parallel(node, bins, token, add,
                               [&](const SpatialBins& part) { bins.merge_parts(part); });
         else
             for (const Reference& reference : node.references) bins.add(reference, mesh);

@@ -64,8 +64,8 @@ Halves divide_uncut(const ReferenceView& node, const SpatialSplit& split, Array<
     return all;
 }
 
-/// The cheapest side for a reference with the given parts. Equal costs: left, then right, then both.
-/// An empty part leaves no choice; the reference stays whole, so nothing of it is lost.
+/// The cheapest side for a reference with the given parts. Equal costs: left, then right, then
+/// both. An empty part leaves no choice; the reference stays whole, so nothing of it is lost.
 Side cheapest_side(const Halves& halves, const Reference& reference, const CutBoxes& parts,
                    bool may_cut) {
     if (parts.right.is_empty()) return Side::left_side;
@@ -73,14 +73,14 @@ Side cheapest_side(const Halves& halves, const Reference& reference, const CutBo
     const double left = halves.left.cost_with(reference.box) + halves.right.cost();
     const double right = halves.left.cost() + halves.right.cost_with(reference.box);
     if (may_cut) {
-        const double both =
-            halves.left.cost_with(parts.left) + halves.right.cost_with(parts.right);
+        const double both = halves.left.cost_with(parts.left) + halves.right.cost_with(parts.right);
         if (both < std::min(left, right)) return Side::both_sides;
     }
     return left <= right ? Side::left_side : Side::right_side;
 }
 
-/// Writes one side's order: positions of references that stay whole, given in order, with the parts merged in.
+/// Writes one side's order: positions of references that stay whole, given in order, with the parts
+/// merged in.
 class OrderMerger {
 public:
     OrderMerger(std::span<std::uint32_t> target, std::span<const Reference> parts, int axis)
@@ -208,9 +208,8 @@ void divide_space(const ReferenceView& node, const SpatialDivision& division,
         return;
     }
     tbb::this_task_arena::isolate([&] {
-        tbb::parallel_for(0, 3, [&](int axis) {
-            divide_order(node, division, axis, ranks, left, right, token);
-        });
+        tbb::parallel_for(
+            0, 3, [&](int axis) { divide_order(node, division, axis, ranks, left, right, token); });
     });
 }
 

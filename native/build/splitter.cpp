@@ -12,8 +12,8 @@ Splitter::Plan Splitter::make_plan(const ReferenceView& node, const NodeState& s
     if (!state.spatial || state.depth >= config_.max_spatial_depth) return plan;
     plan.spatial_below = true;
 
-    // A node that is cheapest as a leaf goes on without spatial splits: the collapse decides on leaves, and
-    // cutting what will share a leaf only adds references.
+    // A node that is cheapest as a leaf goes on without spatial splits: the collapse decides on
+    // leaves, and cutting what will share a leaf only adds references.
     const auto [left, right] = side_boxes(node, plan.object, token_);
     const Box bounds = unite(left, right);
     double limit = plan.object.cost;  // that a spatial split must beat

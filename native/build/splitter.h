@@ -34,8 +34,8 @@ public:
           token_(token),
           min_overlap_area_(config.min_overlap * mesh.bounds.half_area()) {}
 
-    /// Divides a node of at least two references. `allocate(left_size, right_size)` returns the two targets to
-    /// write the children's references to; it may not move `node`.
+    /// Divides a node of at least two references. `allocate(left_size, right_size)` returns the two
+    /// targets to write the children's references to; it may not move `node`.
     template <class Allocate>
     std::pair<NodeState, NodeState> split(const ReferenceView& node, const NodeState& state,
                                           SplitScratch& scratch, Allocate&& allocate) const {
@@ -52,8 +52,8 @@ public:
             divide_space(node, scratch.division, scratch.ranks, left, right, token_);
         else
             divide_objects(node, plan.object, scratch.ranks, left, right, token_);
-        const auto left_budget = std::size_t(double(budget) * double(left_size) /
-                                             double(left_size + right_size));
+        const auto left_budget =
+            std::size_t(double(budget) * double(left_size) / double(left_size + right_size));
         const NodeState child{0, 0, state.depth + 1, plan.spatial_below};
         return {{left_size, left_budget, child.depth, child.spatial},
                 {right_size, budget - left_budget, child.depth, child.spatial}};
@@ -66,8 +66,7 @@ private:
         bool spatial_below = false;  ///< children may try spatial splits
     };
 
-    Plan make_plan(const ReferenceView& node, const NodeState& state,
-                   SplitScratch& scratch) const;
+    Plan make_plan(const ReferenceView& node, const NodeState& state, SplitScratch& scratch) const;
 
     const Mesh& mesh_;
     const TopDownConfig& config_;

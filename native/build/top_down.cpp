@@ -17,15 +17,15 @@ namespace {
 
 constexpr std::uint32_t leaf_bit = 0x80000000U;
 
-/// A finished subtree with its own numbering, depth-first: children's numbers count its interior nodes, or with
-/// leaf_bit its leaves. Node 0 is the root; a single leaf has no nodes.
+/// A finished subtree with its own numbering, depth-first: children's numbers count its interior
+/// nodes, or with leaf_bit its leaves. Node 0 is the root; a single leaf has no nodes.
 struct Fragment {
     Array<BinaryBvh::Children> nodes;
     Array<Reference> leaves;
 };
 
-/// Builds the subtree of a node of at most chunk_size references, in one thread. The references of all
-/// nodes that wait lie one after the other on a stack, the next node's at the end.
+/// Builds the subtree of a node of at most chunk_size references, in one thread. The references of
+/// all nodes that wait lie one after the other on a stack, the next node's at the end.
 class FragmentBuilder {
 public:
     FragmentBuilder(const Splitter& splitter, const Token& token)
@@ -152,19 +152,20 @@ private:
         const auto [left_state, right_state] = splitter_.split(
             node.references.view(0, node.state.size), node.state, scratch, allocate);
         node.references = {};
-        const double left_weight = node.weight * double(left_state.size) /
-                                   double(left_state.size + right_state.size);
+        const double left_weight =
+            node.weight * double(left_state.size) / double(left_state.size + right_state.size);
         node.left = add(left_state, left_weight, std::move(left));
         node.right = add(right_state, node.weight - left_weight, std::move(right));
     }
 
     std::uint32_t add(const NodeState& state, double weight, ReferenceSet references) {
-        const auto place = nodes_.push_back(
-            TopNode{state, weight, std::move(references), 0, 0, {}, 0, 0, 0});
+        const auto place =
+            nodes_.push_back(TopNode{state, weight, std::move(references), 0, 0, {}, 0, 0, 0});
         return std::uint32_t(place - nodes_.begin());
     }
 
-    /// Numbers all nodes depth-first and puts the tree together. Children stand behind their parents in nodes_.
+    /// Numbers all nodes depth-first and puts the tree together. Children stand behind their
+    /// parents in nodes_.
     BinaryBvh number_nodes() {
         for (std::size_t i = nodes_.size(); i-- > 0;)
             if (!nodes_[i].is_fragment())

@@ -12,8 +12,8 @@ namespace bvhlab {
 /// The tree that every builder returns: binary, one reference per leaf.
 ///
 /// With n references there are 2n - 1 nodes: interior nodes 0 .. n-2, leaves n-1 .. 2n-2, root 0.
-/// Leaf node n-1+i holds references[i]. Leaves may stand in any order; a spatial split makes several
-/// references to one triangle, each with the box of its part.
+/// Leaf node n-1+i holds references[i]. Leaves may stand in any order; a spatial split makes
+/// several references to one triangle, each with the box of its part.
 struct BinaryBvh {
     struct Children {
         std::uint32_t left, right;

@@ -13,8 +13,8 @@
 namespace bvhlab {
 namespace {
 
-/// The dynamic programme of Ylitie et al. 2017, section 3.1. For each binary node N and j = 1..k-1 it finds the
-/// least cost C(N, j) of representing N's subtree by a forest of at most j wide trees.
+/// The dynamic programme of Ylitie et al. 2017, section 3.1. For each binary node N and j = 1..k-1
+/// it finds the least cost C(N, j) of representing N's subtree by a forest of at most j wide trees.
 template <unsigned K>
 class DynamicProgramme {
 public:
@@ -41,10 +41,10 @@ public:
         else
             share_out(left_costs, right_costs, best, share);
 
-        // One tree: a leaf of all references, or a wide node over a forest of k. A tie makes a leaf.
+        // One tree: a leaf of all references, or a wide node over a forest of k. A tie makes a
+        // leaf.
         const float relative_area = area(node);
-        const float as_leaf =
-            relative_area * intersection_ * float(charged_tests(plan.size, K));
+        const float as_leaf = relative_area * intersection_ * float(charged_tests(plan.size, K));
         const float as_node = relative_area * traversal_ + best[K];
         plan.cost[1] = as_leaf <= as_node ? as_leaf : as_node;
         plan.left_share[1] = as_leaf <= as_node ? Plan<K>::leaf : std::uint8_t(share[K]);
@@ -75,7 +75,8 @@ private:
         }
     }
 
-    /// All j at once, so that the compiler can use SIMD lanes; infinite entries stand where j - i is not in 1..k-1.
+    /// All j at once, so that the compiler can use SIMD lanes; infinite entries stand where j - i
+    /// is not in 1..k-1.
     static void share_out(const Costs& left, const Costs& right, Costs& best, Shares& share) {
         std::array<float, 2 * K + 1> shifted;
         shifted.fill(infinity);
@@ -90,7 +91,8 @@ private:
         }
     }
 
-    /// Area relative to the root's; 1 in a scene without area, so that leaves are still compared by tests.
+    /// Area relative to the root's; 1 in a scene without area, so that leaves are still compared by
+    /// tests.
     float area(std::uint32_t node) const {
         return scale_ > 0.0 ? float(binary_.boxes[node].half_area() * scale_) : 1.0F;
     }
@@ -130,10 +132,14 @@ Bvh collapse(const BinaryBvh& binary, std::shared_ptr<const Mesh> mesh, unsigned
     if (binary.reference_count() > most_references)
         throw std::length_error("the tree has more than 2^28 references");
     switch (branching) {
-        case 2: return collapse_to<2>(binary, std::move(mesh), model, token);
-        case 4: return collapse_to<4>(binary, std::move(mesh), model, token);
-        case 8: return collapse_to<8>(binary, std::move(mesh), model, token);
-        default: throw std::invalid_argument("branching must be 2, 4 or 8");
+        case 2:
+            return collapse_to<2>(binary, std::move(mesh), model, token);
+        case 4:
+            return collapse_to<4>(binary, std::move(mesh), model, token);
+        case 8:
+            return collapse_to<8>(binary, std::move(mesh), model, token);
+        default:
+            throw std::invalid_argument("branching must be 2, 4 or 8");
     }
 }
 

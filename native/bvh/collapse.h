@@ -10,9 +10,9 @@
 
 namespace bvhlab {
 
-/// Turns a binary tree of single references into a tree of branching factor `branching` (2, 4 or 8) with
-/// adaptive leaf sizes and least cost: the dynamic programme of Ylitie, Karras, Laine 2017, section 3.1, with
-/// Eq. 2 (binary) or Eq. 3 (wide) as cost, then the breadth-first layout.
+/// Turns a binary tree of single references into a tree of branching factor `branching` (2, 4 or 8)
+/// with adaptive leaf sizes and least cost: the dynamic programme of Ylitie, Karras, Laine 2017,
+/// section 3.1, with Eq. 2 (binary) or Eq. 3 (wide) as cost, then the breadth-first layout.
 Bvh collapse(const BinaryBvh& binary, std::shared_ptr<const Mesh> mesh, unsigned branching,
              const CostModel& model, Token& token);
 

@@ -14,8 +14,8 @@ struct CostModel {
     double intersection = 2.0;  ///< c_I, expected cost of one triangle test
 };
 
-/// Triangle tests charged for a leaf of `size` references: `size` in a binary tree (Eq. 2), rounded up to
-/// a multiple of the branching factor k in a wide one (Eq. 3).
+/// Triangle tests charged for a leaf of `size` references: `size` in a binary tree (Eq. 2), rounded
+/// up to a multiple of the branching factor k in a wide one (Eq. 3).
 inline std::size_t charged_tests(std::size_t size, unsigned branching) {
     return branching == 2 ? size : (size + branching - 1) / branching * branching;
 }

@@ -18,8 +18,8 @@ struct Opened {
     unsigned count = 0;
 };
 
-/// Reads the plans top-down, one level at a time, to find each node's children and where they go; then fills all nodes and
-/// blocks at once.
+/// Reads the plans top-down, one level at a time, to find each node's children and where they go;
+/// then fills all nodes and blocks at once.
 template <unsigned K>
 class Layout {
 public:
@@ -104,7 +104,8 @@ private:
         return place;
     }
 
-    /// Opens the wide nodes of one level and places their children behind `end`. Returns the binary nodes of the next level.
+    /// Opens the wide nodes of one level and places their children behind `end`. Returns the binary
+    /// nodes of the next level.
     std::vector<std::uint32_t> open_level(const std::vector<std::uint32_t>& level, Place& end) {
         const std::size_t first = opened_.size();
         const std::uint32_t next_level = end.interior;

@@ -17,14 +17,16 @@ struct Plan {
     static constexpr std::uint8_t leaf = 0;      ///< j = 1: one leaf of all references
     static constexpr std::uint8_t fewer = 0xFF;  ///< j > 1: as for j - 1
 
-    std::array<float, K + 1> cost;               ///< C(N, j), at [j]
-    std::array<std::uint8_t, K + 1> left_share;  ///< trees of the left child, or `leaf` or `fewer`, at [j]
-    std::uint8_t node_share;                     ///< trees of the left child where N is a wide node
-    std::uint32_t size;                          ///< references below N
+    std::array<float, K + 1> cost;  ///< C(N, j), at [j]
+    std::array<std::uint8_t, K + 1>
+        left_share;           ///< trees of the left child, or `leaf` or `fewer`, at [j]
+    std::uint8_t node_share;  ///< trees of the left child where N is a wide node
+    std::uint32_t size;       ///< references below N
 };
 
-/// Lays the planned tree out breadth-first (paper section 3): nodes level by level, in each level from left to
-/// right; leaves in the order in which their parents come, references of a leaf depth-first.
+/// Lays the planned tree out breadth-first (paper section 3): nodes level by level, in each level
+/// from left to right; leaves in the order in which their parents come, references of a leaf
+/// depth-first.
 template <unsigned K>
 Bvh breadth_first_layout(const BinaryBvh& binary, const Array<Plan<K>>& plans,
                          std::shared_ptr<const Mesh> mesh, Token& token);

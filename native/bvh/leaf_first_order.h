@@ -10,8 +10,8 @@
 
 namespace bvhlab {
 
-/// Calls `visit(node)` for every interior node, each after its children, subtrees in parallel. Without recursion:
-/// a tree may be as deep as it has references.
+/// Calls `visit(node)` for every interior node, each after its children, subtrees in parallel.
+/// Without recursion: a tree may be as deep as it has references.
 template <class Visit>
 void for_each_leaf_first(const BinaryBvh& bvh, const Token& token, Visit&& visit) {
     if (bvh.children.empty()) return;

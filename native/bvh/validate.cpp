@@ -10,9 +10,13 @@
 namespace bvhlab {
 namespace {
 
-[[noreturn]] void broken(const std::string& what) { throw std::logic_error("invalid BVH: " + what); }
+[[noreturn]] void broken(const std::string& what) {
+    throw std::logic_error("invalid BVH: " + what);
+}
 
-std::string number(std::size_t value) { return std::to_string(value); }
+std::string number(std::size_t value) {
+    return std::to_string(value);
+}
 
 void check_finite(const Box& box, const std::string& where) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -22,7 +26,8 @@ void check_finite(const Box& box, const std::string& where) {
     }
 }
 
-/// Which corners of each triangle were seen in a box of one of its references, and whether it was seen at all.
+/// Which corners of each triangle were seen in a box of one of its references, and whether it was
+/// seen at all.
 class Coverage {
 public:
     explicit Coverage(const Mesh& mesh) : mesh_(mesh), seen_(mesh.size(), 0) {}
@@ -50,8 +55,9 @@ private:
     std::vector<std::uint8_t> seen_;
 };
 
-/// Breadth-first check of one wide tree: in this layout every child stands behind its parent and interior children
-/// are numbered in the order in which they are met, which also proves that each is visited once.
+/// Breadth-first check of one wide tree: in this layout every child stands behind its parent and
+/// interior children are numbered in the order in which they are met, which also proves that each
+/// is visited once.
 template <unsigned K>
 class WideValidator {
 public:
@@ -163,7 +169,8 @@ void validate(const BinaryBvh& bvh, const Mesh& mesh) {
                 broken("the box of node " + number(node) + " does not contain its child");
         }
     }
-    // Each node but the root being a child exactly once leaves cycles apart from the root to be excluded.
+    // Each node but the root being a child exactly once leaves cycles apart from the root to be
+    // excluded.
     std::vector<std::uint32_t> pending{0};
     std::size_t reached = 0;
     Coverage coverage(mesh);

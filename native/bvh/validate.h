@@ -6,13 +6,13 @@
 
 namespace bvhlab {
 
-/// Checks every invariant of a finished tree: each node but the root is the child of exactly one node, each
-/// triangle is referenced, boxes are free of NaN and contain what is below them, leaf block ranges are
-/// disjoint and complete, and counts and depth are those stored.
+/// Checks every invariant of a finished tree: each node but the root is the child of exactly one
+/// node, each triangle is referenced, boxes are free of NaN and contain what is below them, leaf
+/// block ranges are disjoint and complete, and counts and depth are those stored.
 ///
-/// Boxes of split references need not contain their triangle: then every corner of the triangle must lie in
-/// one of its references' boxes.
-/// Throws std::logic_error with the first broken invariant.
+/// Boxes of split references need not contain their triangle: then every corner of the triangle
+/// must lie in one of its references' boxes. Throws std::logic_error with the first broken
+/// invariant.
 void validate(const Bvh& bvh);
 
 /// The same for a builder's result. Throws std::logic_error.

@@ -11,8 +11,8 @@
 
 namespace bvhlab {
 
-/// Interior node of a k-ary tree, 32k bytes (paper section 3): the boxes of its children, one plane of
-/// all children after the other so that SIMD lanes are children, and where each child is.
+/// Interior node of a k-ary tree, 32k bytes (paper section 3): the boxes of its children, one plane
+/// of all children after the other so that SIMD lanes are children, and where each child is.
 ///
 /// Children come first, missing ones last: an empty box (lower = +inf, upper = -inf), which no ray
 /// enters, index 0 and count 0.
@@ -39,13 +39,13 @@ struct alignas(32) WideNode {
 static_assert(sizeof(WideNode<2>) == 64 && sizeof(WideNode<4>) == 128 &&
               sizeof(WideNode<8>) == 256);
 
-/// Lanes of a triangle block: leaves of wide trees are filled in multiples of k (Eq. 3); binary trees
-/// take four, the narrowest SIMD width.
+/// Lanes of a triangle block: leaves of wide trees are filled in multiples of k (Eq. 3); binary
+/// trees take four, the narrowest SIMD width.
 template <unsigned K>
 inline constexpr unsigned block_lanes = K < 4 ? 4 : K;
 
-/// Original corners of up to `Lanes` triangles of one leaf, lane by lane. Unused lanes repeat the last
-/// triangle with index `no_triangle`.
+/// Original corners of up to `Lanes` triangles of one leaf, lane by lane. Unused lanes repeat the
+/// last triangle with index `no_triangle`.
 template <unsigned Lanes>
 struct alignas(32) TriangleBlock {
     float corners[3][3][Lanes];  ///< [corner a, b, c][axis][lane]
@@ -62,7 +62,8 @@ struct WideBvh {
     Array<TriangleBlock<lanes>> blocks;
 };
 
-/// The tree that rays traverse. The root is always an interior node, so a single leaf is its one child.
+/// The tree that rays traverse. The root is always an interior node, so a single leaf is its one
+/// child.
 struct Bvh {
     std::shared_ptr<const Mesh> mesh;
     std::variant<WideBvh<2>, WideBvh<4>, WideBvh<8>> tree;

@@ -18,16 +18,14 @@ namespace {
 // --- arguments -----------------------------------------------------------------------------------
 
 void check_device(const std::string& device) {
-    if (device != "cpu")
-        throw py::value_error("unknown device '" + device + "'; there is cpu");
+    if (device != "cpu") throw py::value_error("unknown device '" + device + "'; there is cpu");
 }
 
 /// Triangle indices of any integer dtype as uint32, each in range of uint32.
 Array<glm::uvec3> triangle_rows(const py::handle& argument) {
     const py::array array = py::array::ensure(argument);
     const char kind = array ? array.dtype().kind() : '?';
-    if (kind != 'i' && kind != 'u')
-        throw py::value_error("triangles must be an array of integers");
+    if (kind != 'i' && kind != 'u') throw py::value_error("triangles must be an array of integers");
     if (array.ndim() != 2 || array.shape(1) != 3)
         throw py::value_error("triangles must have shape (T, 3)");
     using Indices = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
@@ -65,8 +63,7 @@ Parameters parameters_from_python(const py::dict& given) {
         try {
             parameters[name.cast<std::string>()] = value.cast<double>();
         } catch (const py::cast_error&) {
-            throw py::value_error("parameter '" + name.cast<std::string>() +
-                                  "' must be a number");
+            throw py::value_error("parameter '" + name.cast<std::string>() + "' must be a number");
         }
     }
     return parameters;
@@ -272,18 +269,17 @@ void bind_bvh(py::module_& module) {
                 }
             },
             "Raises RuntimeError with the first broken invariant.")
-        .def_property_readonly("mesh",
-                               [](const PyBvh& self) {
-                                   return std::const_pointer_cast<Mesh>(self.bvh.mesh);
-                               })
+        .def_property_readonly(
+            "mesh", [](const PyBvh& self) { return std::const_pointer_cast<Mesh>(self.bvh.mesh); })
         .def_property_readonly("builder", [](const PyBvh& self) { return self.builder; })
         .def_property_readonly("branching", [](const PyBvh& self) { return self.bvh.branching(); });
 }
 
 void bind_hits(py::module_& module) {
-    py::class_<PyHits>(module, "Hits",
-                       "Answers by ray. A miss has t = inf and triangle = 0xFFFFFFFF; the hit point "
-                       "is (1-u-v) a + u b + v c. With any_hit only `occluded` is answered.")
+    py::class_<PyHits>(
+        module, "Hits",
+        "Answers by ray. A miss has t = inf and triangle = 0xFFFFFFFF; the hit point "
+        "is (1-u-v) a + u b + v c. With any_hit only `occluded` is answered.")
         .def_readonly("t", &PyHits::t)
         .def_readonly("u", &PyHits::u)
         .def_readonly("v", &PyHits::v)
@@ -306,20 +302,20 @@ void bind_core(py::module_& module) {
     bind_mesh(module);
     bind_bvh(module);
     bind_hits(module);
-    module.def("build", &build, py::arg("mesh"), py::arg("builder"), py::arg("branching") = 8,
-               py::arg("device") = "cpu", py::arg("threads") = 0, py::arg("params") = py::dict(),
-               py::arg("traversal") = 3.0, py::arg("intersection") = 2.0,
-               py::arg("token") = nullptr,
-               "Builds a tree. Raises ValueError for unknown names and values out of range, Cancelled "
-               "after token.cancel().");
+    module.def(
+        "build", &build, py::arg("mesh"), py::arg("builder"), py::arg("branching") = 8,
+        py::arg("device") = "cpu", py::arg("threads") = 0, py::arg("params") = py::dict(),
+        py::arg("traversal") = 3.0, py::arg("intersection") = 2.0, py::arg("token") = nullptr,
+        "Builds a tree. Raises ValueError for unknown names and values out of range, Cancelled "
+        "after token.cancel().");
     module.def("trace", &trace_rays, py::arg("bvh"), py::arg("origins"), py::arg("directions"),
-               py::arg("t_min") = 0.0F,
-               py::arg("t_max") = std::numeric_limits<float>::infinity(),
+               py::arg("t_min") = 0.0F, py::arg("t_max") = std::numeric_limits<float>::infinity(),
                py::arg("any_hit") = false, py::arg("reorder") = false, py::arg("device") = "cpu",
                py::arg("threads") = 0, py::arg("count") = false, py::arg("token") = nullptr,
                "Traces rays (N, 3) float32. Raises ValueError naming the first bad ray.");
     module.def("builders", &list_builders, "The builders there are, with their parameters.");
-    module.def("devices", &list_devices, "The devices there are; `reason` says why one is left out.");
+    module.def("devices", &list_devices,
+               "The devices there are; `reason` says why one is left out.");
     module.def("features", &features, "What this build of the core holds.");
 }
 

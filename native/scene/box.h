@@ -2,8 +2,8 @@
 #pragma once
 
 #include <algorithm>
-#include <glm/vec3.hpp>
 #include <glm/common.hpp>
+#include <glm/vec3.hpp>
 #include <glm/vector_relational.hpp>
 #include <limits>
 
@@ -19,9 +19,7 @@ struct Box {
         return {glm::vec3(infinity), glm::vec3(-infinity)};
     }
 
-    bool is_empty() const {
-        return lower.x > upper.x || lower.y > upper.y || lower.z > upper.z;
-    }
+    bool is_empty() const { return lower.x > upper.x || lower.y > upper.y || lower.z > upper.z; }
 
     void grow(const glm::vec3& point) {
         lower = glm::min(lower, point);

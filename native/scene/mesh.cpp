@@ -12,16 +12,17 @@ namespace {
 /// Beyond this the sum of two coordinates overflows float and no box test can be trusted.
 constexpr float largest_coordinate = 1e37F;
 
-bool is_usable(float coordinate) { return std::abs(coordinate) <= largest_coordinate; }
+bool is_usable(float coordinate) {
+    return std::abs(coordinate) <= largest_coordinate;
+}
 
 void check_vertices(const Array<glm::vec3>& vertices) {
     for (std::size_t i = 0; i < vertices.size(); ++i) {
         const glm::vec3& v = vertices[i];
         if (is_usable(v.x) && is_usable(v.y) && is_usable(v.z)) continue;
-        throw std::invalid_argument(
-            "vertex " + std::to_string(i) + " is (" + std::to_string(v.x) + ", " +
-            std::to_string(v.y) + ", " + std::to_string(v.z) +
-            "): coordinates must be finite and at most 1e37 in size");
+        throw std::invalid_argument("vertex " + std::to_string(i) + " is (" + std::to_string(v.x) +
+                                    ", " + std::to_string(v.y) + ", " + std::to_string(v.z) +
+                                    "): coordinates must be finite and at most 1e37 in size");
     }
 }
 

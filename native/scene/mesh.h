@@ -18,8 +18,8 @@ struct Triangle {
     glm::vec3 a, b, c;
 };
 
-/// Triangles in world space. Once made it is trusted: indices in range, coordinates finite, at least
-/// one triangle and at most 2^28 (so that node and block indices fit in 32 bits).
+/// Triangles in world space. Once made it is trusted: indices in range, coordinates finite, at
+/// least one triangle and at most 2^28 (so that node and block indices fit in 32 bits).
 struct Mesh {
     Array<glm::vec3> vertices;
     Array<glm::uvec3> triangles;

@@ -14,38 +14,40 @@ namespace bvhlab {
 
 /// How boxes and triangles are intersected, and why a hit depends on mesh and ray alone.
 ///
-/// A hit is *decided in double*: the watertight test of Woop, Benthin, Wald 2013 on the original float vertices, edges
-/// and corners included. Rays through a shared edge get edge functions of exactly opposite sign from its two
-/// triangles, so nothing slips between them. A float version of the test runs first, over many
-/// triangles at once, and only discards triangles whose edge functions differ in sign by more than
-/// their rounding errors (EdgeFilter); it never decides a hit.
+/// A hit is *decided in double*: the watertight test of Woop, Benthin, Wald 2013 on the original
+/// float vertices, edges and corners included. Rays through a shared edge get edge functions of
+/// exactly opposite sign from its two triangles, so nothing slips between them. A float version of
+/// the test runs first, over many triangles at once, and only discards triangles whose edge
+/// functions differ in sign by more than their rounding errors (EdgeFilter); it never decides a
+/// hit.
 ///
-/// Box tests are conservative (after Ize 2013), with u = 2^-24: the distance (plane - origin) * inverse carries
-/// three roundings and the padded inverse a fourth, a relative error below 4.1 u. Near planes use inverse * (1 - 8u)
-/// and far planes inverse * (1 + 8u), so for t >= 0 the computed interval contains the exact one, with
-/// slack to spare for the error of a hit decided in double. Rounding is monotone, so a larger box has
-/// a computed interval that contains the smaller one's.
+/// Box tests are conservative (after Ize 2013), with u = 2^-24: the distance (plane - origin) *
+/// inverse carries three roundings and the padded inverse a fourth, a relative error below 4.1 u.
+/// Near planes use inverse * (1 - 8u) and far planes inverse * (1 + 8u), so for t >= 0 the computed
+/// interval contains the exact one, with slack to spare for the error of a hit decided in double.
+/// Rounding is monotone, so a larger box has a computed interval that contains the smaller one's.
 ///
-/// The hit's distance is clamped to the computed interval of its triangle's *own box*, and a triangle whose own box is
-/// missed is not hit. By monotony the ray then enters every box that contains the triangle, at a
-/// distance not beyond the hit's: no tree can miss or cull it, and which triangle is closest (ties: the
-/// lower index) is the same for all trees. Where a triangle was split, its parts' boxes are padded so
-/// that the argument holds for one of them (build/sbvh.h).
+/// The hit's distance is clamped to the computed interval of its triangle's *own box*, and a
+/// triangle whose own box is missed is not hit. By monotony the ray then enters every box that
+/// contains the triangle, at a distance not beyond the hit's: no tree can miss or cull it, and
+/// which triangle is closest (ties: the lower index) is the same for all trees. Where a triangle
+/// was split, its parts' boxes are padded so that the argument holds for one of them
+/// (build/sbvh.h).
 ///
-/// Directions are scaled by a power of two so that the longest component is in [1, 2); t is scaled with them, both
-/// exactly. That keeps very long and very short directions away from overflow.
+/// Directions are scaled by a power of two so that the longest component is in [1, 2); t is scaled
+/// with them, both exactly. That keeps very long and very short directions away from overflow.
 struct PreparedRay {
     glm::vec3 origin;
     glm::vec3 direction;  ///< scaled
     float t_min, t_max;   ///< scaled
     double unscale;       ///< the caller's t = scaled t * unscale
-    int near_plane[3];         ///< row of WideNode::planes that the ray meets first, by axis
+    int near_plane[3];    ///< row of WideNode::planes that the ray meets first, by axis
     int far_plane[3];
     glm::vec3 near_origin, far_origin;
     glm::vec3 near_inverse, far_inverse;
-    int kx, ky, kz;            ///< kz: axis of the longest direction component
-    float shear_x, shear_y;    ///< for the float filter
-    float projection_error;    ///< bound on the float error of a projected coordinate
+    int kx, ky, kz;          ///< kz: axis of the longest direction component
+    float shear_x, shear_y;  ///< for the float filter
+    float projection_error;  ///< bound on the float error of a projected coordinate
     double shear_xd, shear_yd, shear_zd;
 
     /// `bounds` is the mesh's box: the same for all trees.
@@ -82,9 +84,9 @@ inline PreparedRay::PreparedRay(const Ray& ray, const Box& bounds) : origin(ray.
         reach = std::max({reach, std::abs(bounds.lower[axis] - origin[axis]),
                           std::abs(bounds.upper[axis] - origin[axis])});
 
-    // Slabs. A component too small to invert is taken as parallel: it moves the ray by less than 2^-90 of the scene's
-    // size. The origin is then moved inward by `nudge` so that a ray in the plane of a face
-    // counts as inside, without 0 * infinity.
+    // Slabs. A component too small to invert is taken as parallel: it moves the ray by less than
+    // 2^-90 of the scene's size. The origin is then moved inward by `nudge` so that a ray in the
+    // plane of a face counts as inside, without 0 * infinity.
     constexpr float parallel = 0x1p-100F;
     constexpr float huge = 0x1p126F;
     for (int axis = 0; axis < 3; ++axis) {
@@ -120,21 +122,22 @@ inline PreparedRay::PreparedRay(const Ray& ray, const Box& bounds) : origin(ray.
     projection_error = 8.0F * u * reach;
 }
 
-/// Computed interval [near, far] in which the ray is inside a box; `planes` by row of WideNode::planes.
+/// Computed interval [near, far] in which the ray is inside a box; `planes` by row of
+/// WideNode::planes.
 inline void box_interval(const PreparedRay& ray, const float (&planes)[6], float& near,
                          float& far) {
     near = ray.t_min;
     far = ray.t_max;
     for (int axis = 0; axis < 3; ++axis) {
-        near = std::max(near, (planes[ray.near_plane[axis]] - ray.near_origin[axis]) *
-                                  ray.near_inverse[axis]);
-        far = std::min(far, (planes[ray.far_plane[axis]] - ray.far_origin[axis]) *
-                                ray.far_inverse[axis]);
+        near = std::max(
+            near, (planes[ray.near_plane[axis]] - ray.near_origin[axis]) * ray.near_inverse[axis]);
+        far = std::min(
+            far, (planes[ray.far_plane[axis]] - ray.far_origin[axis]) * ray.far_inverse[axis]);
     }
 }
 
-/// Decides in double whether the ray meets the triangle; t (scaled), u, v are those of the answer. `corners` is
-/// [corner a, b, c][axis]. Zero-area triangles are never met.
+/// Decides in double whether the ray meets the triangle; t (scaled), u, v are those of the answer.
+/// `corners` is [corner a, b, c][axis]. Zero-area triangles are never met.
 inline bool meets_triangle(const PreparedRay& ray, const float (&corners)[3][3], float& t, float& u,
                            float& v) {
     // Corners relative to the origin, sheared so that the ray runs along the z axis.
@@ -142,8 +145,10 @@ inline bool meets_triangle(const PreparedRay& ray, const float (&corners)[3][3],
     for (int corner = 0; corner < 3; ++corner) {
         const float* position = corners[corner];
         z[corner] = double(position[ray.kz]) - double(ray.origin[ray.kz]);
-        x[corner] = double(position[ray.kx]) - double(ray.origin[ray.kx]) - ray.shear_xd * z[corner];
-        y[corner] = double(position[ray.ky]) - double(ray.origin[ray.ky]) - ray.shear_yd * z[corner];
+        x[corner] =
+            double(position[ray.kx]) - double(ray.origin[ray.kx]) - ray.shear_xd * z[corner];
+        y[corner] =
+            double(position[ray.ky]) - double(ray.origin[ray.ky]) - ray.shear_yd * z[corner];
     }
 
     // Edge functions: signed areas that the ray spans with each edge, proportional to barycentrics.

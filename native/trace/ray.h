@@ -10,8 +10,8 @@
 
 namespace bvhlab {
 
-/// One ray; points on it are origin + t * direction for t in [t_min, t_max], 0 <= t_min. The direction need
-/// not be of unit length; t is in its units.
+/// One ray; points on it are origin + t * direction for t in [t_min, t_max], 0 <= t_min. The
+/// direction need not be of unit length; t is in its units.
 struct Ray {
     glm::vec3 origin;
     float t_min;
@@ -33,8 +33,8 @@ struct RayBatch {
     }
 };
 
-/// What one ray met. A miss has t = infinity, u = v = 0 and triangle = no_triangle. The hit point is
-/// (1 - u - v) a + u b + v c.
+/// What one ray met. A miss has t = infinity, u = v = 0 and triangle = no_triangle. The hit point
+/// is (1 - u - v) a + u b + v c.
 template <class Real>
 struct HitOf {
     Real t, u, v;
@@ -45,10 +45,10 @@ using Hit = HitOf<float>;
 /// Answers for a batch, by ray. Arrays that were not asked for are empty.
 template <class Real>
 struct HitsOf {
-    Array<Real> t, u, v;               ///< closest hit only
-    Array<std::uint32_t> triangle;     ///< closest hit only
-    Array<std::uint8_t> occluded;      ///< always: 1 where something was hit
-    Array<std::uint32_t> node_visits;  ///< interior nodes visited, when counted
+    Array<Real> t, u, v;                  ///< closest hit only
+    Array<std::uint32_t> triangle;        ///< closest hit only
+    Array<std::uint8_t> occluded;         ///< always: 1 where something was hit
+    Array<std::uint32_t> node_visits;     ///< interior nodes visited, when counted
     Array<std::uint32_t> triangle_tests;  ///< triangles tested, unused lanes not counted
 
     double key_seconds = 0.0;  ///< computing sort keys

@@ -25,8 +25,8 @@ std::uint64_t interleave(const glm::vec3& position) {
            spread_by_three(cell(position.z));
 }
 
-/// The 32-bit key: three levels of the origin (9 bits), then levels of origin and direction in turn, from the
-/// highest; the last direction level is cut to x and y.
+/// The 32-bit key: three levels of the origin (9 bits), then levels of origin and direction in
+/// turn, from the highest; the last direction level is cut to x and y.
 std::uint32_t ray_key(const glm::vec3& origin, const glm::vec3& direction) {
     const std::uint64_t o = interleave(origin), d = interleave(direction);
     const auto level = [](std::uint64_t code, int index) {
@@ -50,8 +50,8 @@ RayOrder order_rays(const RayBatch& rays, const Box& bounds, const Token& token)
         const glm::vec3 d = rays.directions[i];
         const glm::vec3 size = glm::abs(d);
         const glm::vec3 scaled = d / std::max(size.x, std::max(size.y, size.z));
-        const glm::vec3 unit = scaled / std::sqrt(scaled.x * scaled.x + scaled.y * scaled.y +
-                                                  scaled.z * scaled.z);
+        const glm::vec3 unit =
+            scaled / std::sqrt(scaled.x * scaled.x + scaled.y * scaled.y + scaled.z * scaled.z);
         keys[i] = ray_key((rays.origins[i] - bounds.lower) * scale, 0.5F * (unit + 1.0F));
         result.order[i] = std::uint32_t(i);
     });

@@ -14,8 +14,8 @@ struct TraceOptions {
     int threads = 0;       ///< 0: all
 };
 
-/// Traces every ray. The answer depends on mesh and ray alone, bit for bit: not on the tree, its branching
-/// factor, reordering, SIMD width or threads (see intersect.h for why).
+/// Traces every ray. The answer depends on mesh and ray alone, bit for bit: not on the tree, its
+/// branching factor, reordering, SIMD width or threads (see intersect.h for why).
 Hits trace(const Bvh& bvh, const RayBatch& rays, const TraceOptions& options, Token& token);
 
 /// The SIMD instruction set that traversal uses on this machine, e.g. "AVX2".

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Stack-based traversal of 2-, 4- and 8-wide trees, one ray at a time, SIMD lanes over a node's children and over a
-// leaf's triangles. Compiled once per instruction set; the best is chosen at run time.
+// Stack-based traversal of 2-, 4- and 8-wide trees, one ray at a time, SIMD lanes over a node's
+// children and over a leaf's triangles. Compiled once per instruction set; the best is chosen at
+// run time.
 #include "trace/traverse.h"
 
 #include <bit>
@@ -34,10 +35,11 @@ unsigned mask_bits(D d, M mask) {
     return bits[0];
 }
 
-/// Bit i of the result is set where the ray enters child i of the node no farther than `t_far`; `urgency[i]` then says
-/// which child comes first, the least: the distance at which its box is entered, or, for any hit, minus
-/// the distance at which it is left. The nearest boxes hold the surroundings of the ray's origin, which
-/// seldom block it: on the diffuse rays of crytek_sponza, farthest first visits a third of the nodes.
+/// Bit i of the result is set where the ray enters child i of the node no farther than `t_far`;
+/// `urgency[i]` then says which child comes first, the least: the distance at which its box is
+/// entered, or, for any hit, minus the distance at which it is left. The nearest boxes hold the
+/// surroundings of the ray's origin, which seldom block it: on the diffuse rays of crytek_sponza,
+/// farthest first visits a third of the nodes.
 template <unsigned K, bool AnyHit>
 HWY_INLINE unsigned enter_children(const WideNode<K>& node, const PreparedRay& ray, float t_far,
                                    float (&urgency)[K]) {
@@ -54,8 +56,7 @@ HWY_INLINE unsigned enter_children(const WideNode<K>& node, const PreparedRay& r
         const auto far_x = distance(ray.far_plane[0], ray.far_origin.x, ray.far_inverse.x, i);
         const auto far_y = distance(ray.far_plane[1], ray.far_origin.y, ray.far_inverse.y, i);
         const auto far_z = distance(ray.far_plane[2], ray.far_origin.z, ray.far_inverse.z, i);
-        const auto enter =
-            hn::Max(hn::Max(near_x, near_y), hn::Max(near_z, hn::Set(d, ray.t_min)));
+        const auto enter = hn::Max(hn::Max(near_x, near_y), hn::Max(near_z, hn::Set(d, ray.t_min)));
         const auto leave = hn::Min(hn::Min(far_x, far_y), hn::Min(far_z, hn::Set(d, t_far)));
         hn::Store(AnyHit ? hn::Neg(leave) : enter, d, urgency + i);
         entered |= mask_bits(d, hn::Le(enter, leave)) << i;
@@ -63,11 +64,11 @@ HWY_INLINE unsigned enter_children(const WideNode<K>& node, const PreparedRay& r
     return entered;
 }
 
-/// Bit i set where triangle i of the block may be met: its edge functions in float do not differ in sign by more than
-/// their error. With e = projection_error the bound on a projected coordinate's error (its terms
-/// are below 6u * reach) and p the largest projected coordinate, an edge function errs by less than
-/// 4 e p + 2 e^2 + 4 u p^2; the smallest normal float covers underflow. Overflow yields infinities or
-/// NaN, for which the comparisons are false and the triangle is kept.
+/// Bit i set where triangle i of the block may be met: its edge functions in float do not differ in
+/// sign by more than their error. With e = projection_error the bound on a projected coordinate's
+/// error (its terms are below 6u * reach) and p the largest projected coordinate, an edge function
+/// errs by less than 4 e p + 2 e^2 + 4 u p^2; the smallest normal float covers underflow. Overflow
+/// yields infinities or NaN, for which the comparisons are false and the triangle is kept.
 template <unsigned Lanes>
 HWY_INLINE unsigned may_meet(const TriangleBlock<Lanes>& block, const PreparedRay& ray) {
     const hn::CappedTag<float, Lanes> d;
@@ -145,8 +146,8 @@ public:
     }
 
 private:
-    /// Enters the children of node `current.child`: the most urgent becomes `current`, the others go on the stack, the
-    /// least urgent first. Returns false where none is entered.
+    /// Enters the children of node `current.child`: the most urgent becomes `current`, the others
+    /// go on the stack, the least urgent first. Returns false where none is entered.
     HWY_INLINE bool descend(const PreparedRay& ray, float t_far, StackEntry& current,
                             StackEntry*& top) {
         if constexpr (Count) ++node_visits;
@@ -238,7 +239,9 @@ void traverse_task(const TraceTask& task) {
     std::visit([&](const auto& tree) { traverse_tree(task, tree); }, task.bvh->tree);
 }
 
-const char* target_name() { return hwy::TargetName(HWY_TARGET); }
+const char* target_name() {
+    return hwy::TargetName(HWY_TARGET);
+}
 
 }  // namespace HWY_NAMESPACE
 }  // namespace bvhlab
@@ -250,9 +253,13 @@ namespace bvhlab {
 HWY_EXPORT(traverse_task);
 HWY_EXPORT(target_name);
 
-void traverse(const TraceTask& task) { HWY_DYNAMIC_DISPATCH(traverse_task)(task); }
+void traverse(const TraceTask& task) {
+    HWY_DYNAMIC_DISPATCH(traverse_task)(task);
+}
 
-const char* simd_name() { return HWY_DYNAMIC_DISPATCH(target_name)(); }
+const char* simd_name() {
+    return HWY_DYNAMIC_DISPATCH(target_name)();
+}
 
 }  // namespace bvhlab
 #endif

@@ -12,7 +12,8 @@ namespace bvhlab {
 
 /// A child that is still to be visited.
 struct StackEntry {
-    float urgency;        ///< the least is visited first; for the closest hit where the ray enters its box
+    float
+        urgency;  ///< the least is visited first; for the closest hit where the ray enters its box
     std::uint32_t child;  ///< node or first triangle block
     std::uint32_t count;  ///< 0 for a node, else references of the leaf
 };

@@ -16,7 +16,8 @@ namespace {
 
 using namespace test;
 
-/// Least cost of `node`'s subtree as at most `trees` wide trees, by trying everything, as Ylitie et al. define it.
+/// Least cost of `node`'s subtree as at most `trees` wide trees, by trying everything, as Ylitie et
+/// al. define it.
 struct Exhaustive {
     const BinaryBvh& binary;
     CostModel model;
@@ -132,8 +133,14 @@ TEST(Validate, FindsEachDefect) {
     broken([](Bvh&, auto& wide) { wide.blocks[0].triangle[0] = no_triangle; });
     broken([](Bvh&, auto& wide) { wide.blocks[0].triangle[0] ^= 1U; });
     broken([](Bvh&, auto& wide) { wide.blocks[0].corners[1][2][0] += 1.0F; });
-    broken([&](Bvh&, auto& wide) { auto [node, i] = leaf_of(wide); node.child[i] += 1; });
-    broken([&](Bvh&, auto& wide) { auto [node, i] = leaf_of(wide); node.count[i] += 4; });
+    broken([&](Bvh&, auto& wide) {
+        auto [node, i] = leaf_of(wide);
+        node.child[i] += 1;
+    });
+    broken([&](Bvh&, auto& wide) {
+        auto [node, i] = leaf_of(wide);
+        node.count[i] += 4;
+    });
 }
 
 }  // namespace

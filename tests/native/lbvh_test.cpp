@@ -52,8 +52,8 @@ TEST(Lbvh, IsTheSameForAnyThreadCount) {
 
 TEST(Lbvh, SplitsWhereTheHighestBitChanges) {
     // Centres at the cells 0, 1, 3 of a line: 3 parts from 0 and 1 first.
-    const Mesh mesh = make_mesh({{0, 0, 0}, {1, 0, 0}, {3, 0, 0}},
-                                {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}});
+    const Mesh mesh =
+        make_mesh({{0, 0, 0}, {1, 0, 0}, {3, 0, 0}}, {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}});
     Token token;
     const BinaryBvh bvh = build_lbvh(mesh, token);
     EXPECT_EQ(bvh.reference(bvh.children[0].right), 2U);

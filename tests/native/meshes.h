@@ -63,7 +63,8 @@ inline Mesh sphere(int rows, glm::vec3 centre = glm::vec3(0.0F), float radius = 
         for (int column = 0; column < columns; ++column) {
             const int next = (column + 1) % columns;
             const auto vertex = [&](int r, int c) { return std::uint32_t(r * columns + c); };
-            triangles.push_back({vertex(row, column), vertex(row + 1, column), vertex(row + 1, next)});
+            triangles.push_back(
+                {vertex(row, column), vertex(row + 1, column), vertex(row + 1, next)});
             triangles.push_back({vertex(row, column), vertex(row + 1, next), vertex(row, next)});
         }
     }

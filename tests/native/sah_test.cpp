@@ -173,8 +173,8 @@ TEST(Sah, RootSplitOfALargeNodeIsTheBestOfTheSweep) {
         box = Box::empty();
         for (std::size_t i = 1; i < order.size(); ++i) {
             box.grow(mesh.box(order[i - 1]));
-            least = std::min(least,
-                             box.half_area() * double(i) + areas[i] * double(order.size() - i));
+            least =
+                std::min(least, box.half_area() * double(i) + areas[i] * double(order.size() - i));
         }
     }
     EXPECT_EQ(cost, least);

@@ -85,8 +85,8 @@ glm::dvec3 point_of(const Triangle& triangle, std::mt19937& random) {
            sum;
 }
 
-/// Whether one of the boxes holds the point, moved by up to a quarter of the pad (clip.h) on each axis, but not out of
-/// the triangle's box, which all boxes are cropped to.
+/// Whether one of the boxes holds the point, moved by up to a quarter of the pad (clip.h) on each
+/// axis, but not out of the triangle's box, which all boxes are cropped to.
 bool is_covered(glm::dvec3 point, const Box& whole, const std::vector<Box>& boxes,
                 std::mt19937& random) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -107,8 +107,7 @@ float plane_through(const Box& box, const Triangle& triangle, int axis, std::mt1
     const float low = box.lower[axis], high = box.upper[axis];
     float plane = uniform(random, low, high);
     if (random() % 3 == 0) plane = triangle.a[axis];
-    if (random() % 3 == 0)
-        plane = std::nextafter(plane, random() % 2 == 0 ? low : high);
+    if (random() % 3 == 0) plane = std::nextafter(plane, random() % 2 == 0 ? low : high);
     return std::clamp(plane, low, high);
 }
 
@@ -207,11 +206,10 @@ TEST(SpatialBins, FindTheBestPlane) {
 }
 
 TEST(Sbvh, IsValidOnEveryShapeOfInput) {
-    for (const Mesh& mesh :
-         {random_soup(1), random_soup(2), random_soup(3), random_soup(4500), needles(2),
-          needles(1000), needles(100, 1e18F), needles(100, 1e-18F), needles(100, 5e36F),
-          needles(100, 1e-40F), growing_chain(3000, 1.04), growing_chain(100, 3.0), sphere(30),
-          copies(1), copies(500)})
+    for (const Mesh& mesh : {random_soup(1), random_soup(2), random_soup(3), random_soup(4500),
+                             needles(2), needles(1000), needles(100, 1e18F), needles(100, 1e-18F),
+                             needles(100, 5e36F), needles(100, 1e-40F), growing_chain(3000, 1.04),
+                             growing_chain(100, 3.0), sphere(30), copies(1), copies(500)})
         for (const SbvhConfig& config : {SbvhConfig{}, eager()})
             EXPECT_NO_THROW(validate(build(mesh, config), mesh));
 }
@@ -236,8 +234,8 @@ TEST(Sbvh, LeafBoxesCoverEveryTriangle) {
         const auto boxes = boxes_by_triangle(bvh, mesh.size());
         for (std::size_t i = 0; i < mesh.size(); ++i)
             for (int sample = 0; sample < 20; ++sample)
-                ASSERT_TRUE(is_covered(point_of(mesh.triangle(i), random), mesh.box(i), boxes[i],
-                                       random));
+                ASSERT_TRUE(
+                    is_covered(point_of(mesh.triangle(i), random), mesh.box(i), boxes[i], random));
     }
     EXPECT_GT(references, 2U * 5400U);  // there were cuts to test
 }
@@ -291,8 +289,11 @@ TEST(Sbvh, ParametersAreTheConfig) {
     EXPECT_EQ(defaults.spatial_bins, 128);
     EXPECT_EQ(defaults.max_spatial_depth, 48);
     EXPECT_EQ(defaults.max_leaf_size, 8);
-    const Parameters given{{"alpha", 0.5},         {"spatial_bins", 16}, {"max_spatial_depth", 3},
-                           {"max_references", 2}, {"max_leaf_size", 4}};
+    const Parameters given{{"alpha", 0.5},
+                           {"spatial_bins", 16},
+                           {"max_spatial_depth", 3},
+                           {"max_references", 2},
+                           {"max_leaf_size", 4}};
     const SbvhConfig config = sbvh_config(check_parameters(info, given));
     EXPECT_EQ(config.alpha, 0.5);
     EXPECT_EQ(config.spatial_bins, 16);

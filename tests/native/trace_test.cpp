@@ -3,9 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include <glm/geometric.hpp>
 #include <hwy/highway.h>
 #include <hwy/targets.h>
+#include <glm/geometric.hpp>
 
 #include <cstring>
 #include <limits>
@@ -55,7 +55,8 @@ Rays awkward_rays(const Mesh& mesh) {
             for (const float y : parts)
                 for (const float z : parts)
                     if (x != 0.0F || y != 0.0F || z != 0.0F)
-                        rays.add(mesh.triangle(i).a - glm::vec3(0.0F, 0.0F, float(i % 3)), {x, y, z});
+                        rays.add(mesh.triangle(i).a - glm::vec3(0.0F, 0.0F, float(i % 3)),
+                                 {x, y, z});
     return rays;
 }
 
@@ -82,7 +83,8 @@ void expect_one_answer(std::shared_ptr<const Mesh> mesh, const Rays& rays) {
         for (const CostModel& model : {CostModel{3.0, 2.0}, CostModel{1e-3, 1e3}}) {
             const Bvh bvh = collapse(binary, mesh, k, model, token);
             for (const bool reorder : {false, true})
-                expect_same(expected, trace(bvh, rays.batch(), {.reorder = reorder, .threads = 3}, token),
+                expect_same(expected,
+                            trace(bvh, rays.batch(), {.reorder = reorder, .threads = 3}, token),
                             "k " + std::to_string(k));
             const Hits any = trace(bvh, rays.batch(), {.any_hit = true}, token);
             EXPECT_EQ(any.occluded, expected.occluded) << "any hit, k " << k;
