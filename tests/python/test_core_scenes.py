@@ -58,9 +58,7 @@ def random_rays(mesh: Any, count: int, seed: int) -> tuple[np.ndarray, np.ndarra
     return origins, directions
 
 
-@pytest.mark.parametrize(
-    ("builder", "branching"), list(itertools.product(PAPER_COSTS, (2, 4, 8)))
-)
+@pytest.mark.parametrize(("builder", "branching"), list(itertools.product(PAPER_COSTS, (2, 4, 8))))
 def test_costs_are_the_papers(builder: str, branching: int) -> None:
     bvh = core.build(load("crytek_sponza"), builder, branching=branching)
     paper = PAPER_COSTS[builder][(2, 4, 8).index(branching)]
@@ -97,7 +95,9 @@ def test_all_variants_give_the_same_hits(name: str) -> None:
 
 def judge_sample(mesh: Any, hit: Any, origins: np.ndarray, directions: np.ndarray) -> None:
     """Compares an even sample of the rays with brute force, exact up to ties in t."""
-    sample = np.arange(0, len(origins), max(1, len(origins) * len(mesh.triangles) // BRUTE_FORCE_TESTS))
+    sample = np.arange(
+        0, len(origins), max(1, len(origins) * len(mesh.triangles) // BRUTE_FORCE_TESTS)
+    )
     judge = core.brute_force(mesh, origins[sample], directions[sample])
     assert np.array_equal(hit.occluded[sample], judge.occluded)
     found = judge.occluded

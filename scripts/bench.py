@@ -1,0 +1,256 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`make bench`: builders and tracing against Embree and mathutils.bvhtree, on the same rays.
+
+Machines are shared and noisy, so every figure is a ratio to Embree within one round, the median
+over rounds with the quartiles; contenders take turns within a round.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from bvh_lab.native import core
+from bvh_lab.study.load import load_mesh_file
+from bvh_lab.study.machine import describe_machine
+from bvh_lab.study.plan import Plan
+from bvh_lab.study.rays import choose_views, generate_rays
+from bvh_lab.study.results import KINDS, Result, Row, spread
+from bvh_lab.study.run import compare
+from bvh_lab.study.scene import Camera, Scene
+
+SHARED = Path(__file__).resolve().parents[2] / "shared" / "scenes"
+SLOW_RAYS = 20_000  # for mathutils.bvhtree, which takes one ray per Python call
+
+# The paper's three views, in coordinates where the scene's longest side is 1: position, direction.
+PAPER_VIEWS = {
+    "crytek_sponza": [
+        ((0.26, 0.06, 0.32), (1.0, 0.0, 0.0)),
+        ((0.26, 0.06, 0.32), (0.82, 0.32, 0.47)),
+        ((0.76, 0.07, 0.31), (1.0, 0.07, 0.01)),
+    ],
+    "crown": [
+        ((0.15, 0.04, 0.22), (0.76, 0.2, 0.62)),
+        ((0.34, 0.07, 0.22), (0.47, 0.34, 0.81)),
+        ((0.46, 0.1, 0.33), (0.18, 0.14, 0.97)),
+    ],
+}
+FIELD_OF_VIEW = 45.0  # degrees, vertical
+
+
+def paper_camera(scene: Scene, name: str, position: Any, direction: Any) -> Camera:
+    """A camera of the paper: Y up, position in the normalised scene."""
+    used = scene.vertices[np.unique(scene.triangles)].astype(np.float64)
+    lower, upper = used.min(axis=0), used.max(axis=0)
+    backward = -np.asarray(direction) / np.linalg.norm(direction)
+    right = np.cross((0.0, 1.0, 0.0), backward)
+    right /= np.linalg.norm(right)
+    to_world = np.eye(4)
+    to_world[:3, :3] = np.stack((right, np.cross(backward, right), backward), axis=1)
+    to_world[:3, 3] = lower + np.asarray(position) * (upper - lower).max()
+    top = float(np.tan(np.radians(FIELD_OF_VIEW) / 2))
+    return Camera(name, "perspective", to_world, (-top * 4 / 3, top * 4 / 3, -top, top))
+
+
+def load_scene(path: Path) -> Scene:
+    scene = load_mesh_file(path, up="y")
+    if path.stem in PAPER_VIEWS:
+        scene.cameras = [
+            paper_camera(scene, f"paper {i + 1}", *view)
+            for i, view in enumerate(PAPER_VIEWS[path.stem])
+        ]
+    return scene
+
+
+def ratio_text(ratios: list[float]) -> str:
+    """Median with quartiles."""
+    low, median, high = spread(ratios)
+    return f"{median:6.2f} [{low:.2f} {high:.2f}]"
+
+
+# --- building ------------------------------------------------------------------------------------
+
+
+def build_contenders(mesh: Any) -> dict[str, Callable[[], float]]:
+    """Name to a function that builds once and gives the seconds."""
+
+    def ours(builder: str) -> Callable[[], float]:
+        return lambda: float(core.build(mesh, builder, branching=8).stats["build_seconds"])
+
+    def embree(quality: str) -> Callable[[], float]:
+        return lambda: float(core.EmbreeScene(mesh, quality=quality, robust=False).build_seconds)
+
+    contenders = {f"Embree {quality}": embree(quality) for quality in ("low", "medium", "high")}
+    contenders |= {entry["label"]: ours(entry["id"]) for entry in core.builders()}
+    return contenders
+
+
+def bench_builds(mesh: Any, repeats: int) -> list[str]:
+    """Lines of the table of build times, as ratios to each of Embree's qualities."""
+    contenders = build_contenders(mesh)
+    seconds: dict[str, list[float]] = {name: [] for name in contenders}
+    for repeat in range(repeats + 1):
+        for name, build in contenders.items():
+            measured = build()
+            if repeat:  # the first round warms up
+                seconds[name].append(measured)
+    lines = [
+        f"Build time, 8-wide (tree, collapse and layout), {repeats} rounds: median [quartiles]",
+        f"{'':14s} {'ms':>9s}  "
+        + " ".join(f"{'/ Embree ' + quality:>20s}" for quality in ("low", "medium", "high")),
+    ]
+    for name, own in seconds.items():
+        ratios = [
+            ratio_text([a / b for a, b in zip(own, seconds[f"Embree {q}"], strict=True)])
+            for q in ("low", "medium", "high")
+        ]
+        lines.append(
+            f"{name:14s} {1e3 * spread(own).median:9.1f}  " + " ".join(f"{r:>20s}" for r in ratios)
+        )
+    return lines
+
+
+# --- tracing -------------------------------------------------------------------------------------
+
+
+def round_seconds(row: Row, kind: str) -> list[float]:
+    """Seconds of each round over all views."""
+    return [sum(views) for views in zip(*(m.seconds for m in row.of_kind(kind)), strict=True)]
+
+
+def speed_ratios(row: Row, rival: Row, kind: str) -> list[float]:
+    """Speed of ``row`` over that of ``rival``, round by round."""
+    pairs = zip(round_seconds(row, kind), round_seconds(rival, kind), strict=True)
+    return [theirs / ours for ours, theirs in pairs]
+
+
+def trace_lines(result: Result, slow: dict[str, float]) -> list[str]:
+    """Lines of the table of tracing speeds, as ratios to robust and to fast Embree."""
+    lines = [
+        f"Speed / Embree high robust in the same round, {result.plan.repeats} rounds: "
+        "median [quartiles];",
+        "wrong hits of the rays judged by brute force; nodes visited and triangles tested",
+        "per diffuse ray",
+        f"{'':22s}"
+        + "".join(f"{kind:>20s}" for kind in KINDS)
+        + "  wrong hits     nodes  triangles",
+    ]
+    robust = result.row("embree_high_robust")
+    for row in result.rows:
+        if row.error:
+            lines.append(f"{row.label:22s} failed: {row.error}")
+            continue
+        name = f"{row.label} {row.branching}-wide" if row.branching else row.label
+        cells = "".join(f"{ratio_text(speed_ratios(row, robust, kind)):>20s}" for kind in KINDS)
+        errors = row.errors()
+        counts = [row.per_ray(counter, "diffuse") for counter in ("node_visits", "triangle_tests")]
+        shown = "".join(
+            f"{count:10.2f}" if count is not None else f"{'-':>10s}" for count in counts
+        )
+        lines.append(f"{name:22s}{cells}  {errors.wrong:4d} of {errors.judged:d}{shown}")
+    cells = "".join(
+        f"{slow[kind] / robust_speed.median:>14.4f}{'':6s}"
+        if (robust_speed := robust.speed(kind))
+        else ""
+        for kind in KINDS
+    )
+    lines.append(
+        f"{'mathutils.bvhtree':22s}{cells}  (one thread, one ray per call, {SLOW_RAYS} rays)"
+    )
+    speeds = ", ".join(
+        f"{kind} {speed.median:.2f}" for kind in KINDS if (speed := robust.speed(kind))
+    )
+    lines.append(f"Embree high robust itself, MRays/s: {speeds}")
+    return lines
+
+
+def mathutils_speed(scene: Scene, plan: Plan) -> dict[str, float]:
+    """MRays/s by kind of what a Blender user has today, on the first rays of the first view."""
+    from mathutils.bvhtree import BVHTree
+
+    tree = BVHTree.FromPolygons(
+        scene.vertices.tolist(), scene.triangles.tolist(), all_triangles=True
+    )
+    mesh = core.Mesh(scene.vertices, scene.triangles)
+    view = choose_views(core, scene, plan)[0]
+    bvh = core.build(mesh, "lbvh")
+    core_scene = core.Scene(
+        mesh,
+        np.full((1, 3), 0.8, np.float32),
+        np.zeros((1, 3), np.float32),
+        scene.material_index,
+        [],
+        scene.world,
+    )
+    generate_rays(core, core_scene, view, bvh, plan, core.Token())
+    speeds = {}
+    for rays in view.sets:
+        chosen = np.random.default_rng(0).permutation(len(rays))[:SLOW_RAYS]
+        origins, directions = rays.origins[chosen].tolist(), rays.directions[chosen].tolist()
+        far = np.broadcast_to(np.minimum(rays.t_max, 1e30), len(rays))[chosen].tolist()
+        start = time.perf_counter()
+        for origin, direction, distance in zip(origins, directions, far, strict=True):
+            tree.ray_cast(origin, direction, distance)
+        speeds[rays.kind] = 1e-6 * len(chosen) / (time.perf_counter() - start)
+    return speeds
+
+
+def bench(path: Path, out: Path, arguments: argparse.Namespace) -> str:
+    scene = load_scene(path)
+    mesh = core.Mesh(scene.vertices, scene.triangles)
+    plan = Plan.from_preset("paper")
+    plan.width, plan.height = arguments.resolution
+    plan.repeats, plan.build_repeats, plan.pictures = arguments.repeats, 1, False
+    plan.judged_rays = 256
+    large = len(scene.triangles) > 1_000_000
+    machine = describe_machine(core, f"bpy {bpy.app.version_string}")
+    lines = [
+        f"{path.stem}: {len(scene.triangles)} triangles, views: "
+        + ", ".join(camera.name for camera in scene.cameras),
+        f"{machine.cpu}, {machine.cores} cores, {core.devices()[0]['simd']}, "
+        f"Embree {machine.embree}, {plan.width}x{plan.height}",
+        "",
+        *bench_builds(mesh, 3 if large else arguments.repeats),
+        "",
+    ]
+    print("\n".join(lines), flush=True)
+    result = compare(scene, plan).result
+    traced = trace_lines(result, mathutils_speed(scene, plan))
+    print("\n".join(traced), flush=True)
+    text = "\n".join([*lines, *traced]) + "\n"
+    out.mkdir(parents=True, exist_ok=True)
+    (out / f"{path.stem}.txt").write_text(text)
+    (out / f"{path.stem}.csv").write_text(result.to_csv())
+    (out / f"{path.stem}.json").write_text(result.to_json())
+    return text
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "scenes", nargs="*", type=Path, help="mesh files; default: crytek_sponza and crown"
+    )
+    parser.add_argument("--out", type=Path, default=Path("out/bench"))
+    parser.add_argument("--repeats", type=int, default=7)
+    parser.add_argument("--resolution", default="640x480")
+    arguments = parser.parse_args()
+    arguments.resolution = [int(side) for side in arguments.resolution.split("x")]
+    scenes = arguments.scenes or [SHARED / "crytek_sponza.npz", SHARED / "crown.npz"]
+    missing = [str(path) for path in scenes if not path.is_file()]
+    if missing:
+        print(f"bench: error: there is no file {missing[0]}", file=sys.stderr)
+        return 2
+    for path in scenes:
+        bench(path, arguments.out, arguments)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How near to the exact answer hits are, and where they may differ from it.
+
+The traversal decides in double, with a relative error of some 2^-50 in the edge functions; the
+judge decides exactly. They may differ only where the ray passes an edge within that error, and t
+may differ by float rounding alone.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from bvh_lab.native import core
+
+
+def edge_margin(corners: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> float:
+    """How far inside its triangle the ray passes, exactly: the least edge volume over the sum.
+
+    0 on an edge, negative outside; in units of barycentric coordinates.
+    """
+    exact = [[Fraction(float(x)) for x in point] for point in (*corners, origin, direction)]
+    a, b, c = ([p - o for p, o in zip(corner, exact[3], strict=True)] for corner in exact[:3])
+    d = exact[4]
+
+    def volume(p: list[Fraction], q: list[Fraction]) -> Fraction:
+        return (
+            d[0] * (p[1] * q[2] - p[2] * q[1])
+            + d[1] * (p[2] * q[0] - p[0] * q[2])
+            + d[2] * (p[0] * q[1] - p[1] * q[0])
+        )
+
+    volumes = [volume(b, c), volume(c, a), volume(a, b)]
+    total = sum(volumes)
+    return float(min(v / total for v in volumes)) if total else 0.0
+
+
+def rays_at_edges(count: int, seed: int, offset: float) -> tuple[np.ndarray, ...]:
+    """Triangles, and rays aimed at points of their edges, the scene moved by ``offset``."""
+    random = np.random.default_rng(seed)
+    corners = (random.random((count, 3, 3)) + offset).astype(np.float32)
+    along = random.random((count, 1))
+    targets = (1 - along) * corners[:, 0] + along * corners[:, 1]
+    origins = (random.normal(size=(count, 3)) * 3 + offset).astype(np.float32)
+    return corners, origins, (targets - origins).astype(np.float32)
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e3, 1e6])
+def test_hits_differ_from_the_exact_answer_only_within_rounding_of_an_edge(offset: float) -> None:
+    corners, origins, directions = rays_at_edges(3000, seed=7, offset=offset)
+    differ = 0
+    for corner, origin, direction in zip(corners, origins, directions, strict=True):
+        mesh = core.Mesh(corner, np.array([[0, 1, 2]], np.uint32))
+        bvh = core.build(mesh, "lbvh", branching=2)
+        hit = core.trace(bvh, origin[None], direction[None])
+        judge = core.brute_force(mesh, origin[None], direction[None])
+        margin = edge_margin(corner, origin, direction)
+        # The judge is exact; its margin says so.
+        assert bool(judge.occluded[0]) == (margin >= 0 and judge.t[0] >= 0) or np.isinf(judge.t[0])
+        if hit.occluded[0] != judge.occluded[0]:
+            differ += 1
+            assert abs(margin) < 1e-12
+        elif hit.occluded[0]:
+            assert abs(hit.t[0] - judge.t[0]) <= 2 * np.spacing(np.float32(judge.t[0]))
+    # Far from the origin coordinates are coarse and many rays pass an edge exactly.
+    assert differ <= (3 if offset < 1e5 else 300)
+
+
+def test_no_ray_aimed_at_a_vertex_or_edge_of_a_closed_mesh_gets_through() -> None:
+    random = np.random.default_rng(3)
+    # A subdivided octahedron with bumps: closed, irregular.
+    vertices = np.array(
+        [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], np.float64
+    )
+    triangles = [(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4)]
+    triangles += [(b, a, 5) for a, b, _ in triangles]
+    points = [tuple(v) for v in vertices]
+    for _ in range(4):
+        middle: dict[tuple[int, int], int] = {}
+        finer = []
+        for a, b, c in triangles:
+            mid = []
+            for i, j in ((a, b), (b, c), (c, a)):
+                key = (min(i, j), max(i, j))
+                if key not in middle:
+                    middle[key] = len(points)
+                    point = np.add(points[i], points[j])
+                    points.append(tuple(point / np.linalg.norm(point)))
+                mid.append(middle[key])
+            ab, bc, ca = mid
+            finer += [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
+        triangles = finer
+    bumpy = np.array(points) * (1 + 0.2 * random.random((len(points), 1)))
+    for offset in (0.0, 1e4):
+        moved = (bumpy + offset).astype(np.float32)
+        faces = np.array(triangles, np.uint32)
+        mesh = core.Mesh(moved, faces)
+        targets = np.concatenate([moved, *(moved[faces].mean(axis=1, keepdims=False),)])
+        edges = (moved[faces[:, 0]] + moved[faces[:, 1]]) / 2
+        targets = np.concatenate([targets, edges])
+        origin = np.full((len(targets), 3), offset, np.float32)
+        directions = targets - origin
+        for builder in ("lbvh", "sah", "sbvh"):
+            for branching in (2, 4, 8):
+                bvh = core.build(mesh, builder, branching=branching)
+                assert core.trace(bvh, origin, directions).occluded.all()
+                assert core.trace(bvh, origin, directions, any_hit=True).occluded.all()
