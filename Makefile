@@ -24,7 +24,7 @@ build: setup ## build the native module; PYTHONPATH=build finds the package bvh_
 
 compare: check-scene build ## compare BVHs on SCENE=file (.blend, .npz, .obj, .ply), with ARGS="--builders lbvh,sah"
 	@name=$$(basename "$$SCENE"); out="out/$${name%.*}"; case "$$SCENE" in \
-	*.blend) $(BLENDER) "$$SCENE" --python-exit-code 1 --python addon/cli.py -- compare --out "$$out" $(ARGS);; \
+	*.blend) $(BLENDER) --factory-startup "$$SCENE" --python-exit-code 1 --python addon/cli.py -- compare --out "$$out" $(ARGS);; \
 	*) $(PYTHON) -m bvh_lab compare "$$SCENE" --out "$$out" $(ARGS);; esac
 
 check-scene:

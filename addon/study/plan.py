@@ -57,7 +57,7 @@ class Plan:
     long_side: int = 512
     width: int = 0
     height: int = 0
-    samples: int = 8
+    samples: int = 4
     pictures: bool = True
     embree: bool = True
     repeats: int = 3

@@ -4,7 +4,7 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
-#include <utility>
+#include <limits>
 
 #include "build/chunks.h"
 #include "build/object_split.h"
@@ -15,11 +15,10 @@ namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
-/// The corners of a triangle in ascending order of position.
+/// The corners of a triangle in ascending order of position, and the inverse lengths of the edges
+/// 0-1, 1-2 and 0-2: 0 for edges too steep to be lines.
 struct Profile {
-    double positions[3];
-    double
-        inverses[3];  ///< of the lengths of edges 0-1, 1-2, 0-2; 0 for edges too steep to be lines
+    double positions[3], inverses[3];
 
     void measure() {
         constexpr double steepest = 1e-6;

@@ -84,11 +84,13 @@ Side cheapest_side(const Halves& halves, const Reference& reference, const CutBo
 class OrderMerger {
 public:
     OrderMerger(std::span<std::uint32_t> target, std::span<const Reference> parts, int axis)
-        : target_(target), parts_(parts), axis_(axis), sorted_(parts.size()) {
-        const auto first = std::uint32_t(target.size() - parts.size());
+        : target_(target),
+          parts_(parts),
+          axis_(axis),
+          first_part_(std::uint32_t(target.size() - parts.size())),
+          sorted_(parts.size()) {
         std::iota(sorted_.begin(), sorted_.end(), 0U);
         std::ranges::stable_sort(sorted_, {}, [&](std::uint32_t part) { return centre(part); });
-        first_part_ = first;
     }
 
     void add(std::uint32_t position, const Reference& reference) {
@@ -110,7 +112,7 @@ private:
     std::span<std::uint32_t> target_;
     std::span<const Reference> parts_;
     int axis_;
-    std::uint32_t first_part_ = 0;
+    std::uint32_t first_part_;
     std::vector<std::uint32_t> sorted_;
     std::size_t next_ = 0, size_ = 0;
 };

@@ -2,11 +2,15 @@
 #include "image/write.h"
 
 #include <OpenImageIO/color.h>
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
+#include <cctype>
+#include <cerrno>
+#include <cstdio>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -29,7 +33,7 @@ std::string lower_extension(const fs::path& path) {
     return extension;
 }
 
-/// A name beside `path` that nobody else uses; the extension stays, for it chooses the format.
+/// A name beside `path` that nobody else uses.
 fs::path name_aside(const fs::path& path) {
     static std::atomic<unsigned> counter = 0;
     const std::string mark = std::to_string(getpid()) + "-" + std::to_string(++counter);
@@ -56,16 +60,44 @@ std::vector<float> display_values(const ImageView& image) {
     return values;
 }
 
-/// Writes `file` as a whole, or throws with OpenImageIO's reason.
-void write_file(const fs::path& path, const fs::path& file, const OIIO::ImageSpec& spec,
-                const float* values) {
-    const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(file.string());
+/// The bytes of the picture's file. In memory, because OpenImageIO does not notice a full disk
+/// under a PNG.
+std::vector<unsigned char> encode(const fs::path& path, const OIIO::ImageSpec& spec,
+                                  const float* values) {
+    std::vector<unsigned char> bytes;
+    OIIO::Filesystem::IOVecOutput memory(bytes);
+    const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(path.string());
     if (!output) refuse(path, OIIO::geterror());
-    const bool written =
-        output->open(file.string(), spec) && output->write_image(OIIO::TypeDesc::FLOAT, values);
-    // Closed in any case; close() fails where the last bytes do not fit.
-    const std::string reason = output->geterror();
-    if (!output->close() || !written) refuse(path, reason.empty() ? output->geterror() : reason);
+    const bool written = output->set_ioproxy(&memory) && output->open(path.string(), spec) &&
+                         output->write_image(OIIO::TypeDesc::FLOAT, values) && output->close();
+    if (!written) refuse(path, output->geterror());
+    return bytes;
+}
+
+/// Writes the bytes to `file`; false with errno set where not all of them could be written.
+bool write_bytes(const fs::path& file, const std::vector<unsigned char>& bytes) {
+    std::FILE* stream = std::fopen(file.c_str(), "wb");
+    if (!stream) return false;
+    const bool written = std::fwrite(bytes.data(), 1, bytes.size(), stream) == bytes.size() &&
+                         std::fflush(stream) == 0;
+    const int reason = errno;
+    const bool closed = std::fclose(stream) == 0;
+    if (!written) errno = reason;
+    return written && closed;
+}
+
+/// Puts the bytes at `path` all at once, or throws and leaves what was there.
+void replace_file(const fs::path& path, const std::vector<unsigned char>& bytes) {
+    const fs::path aside = name_aside(path);
+    std::error_code error;
+    if (write_bytes(aside, bytes))
+        fs::rename(aside, path, error);
+    else
+        error = std::error_code(errno, std::generic_category());
+    if (!error) return;
+    std::error_code ignored;
+    fs::remove(aside, ignored);
+    refuse(path, error.message());
 }
 
 void check(const fs::path& path, const ImageView& image, const std::string& extension) {
@@ -100,20 +132,7 @@ void write_image(const fs::path& path, const ImageView& image) {
     }
 
     const std::vector<float> display = is_png ? display_values(image) : std::vector<float>();
-    const fs::path aside = name_aside(path);
-    std::error_code error;
-    try {
-        write_file(path, aside, spec, is_png ? display.data() : image.values);
-    } catch (...) {
-        fs::remove(aside, error);
-        throw;
-    }
-    fs::rename(aside, path, error);
-    if (error) {
-        const std::string reason = error.message();
-        fs::remove(aside, error);
-        refuse(path, reason);
-    }
+    replace_file(path, encode(path, spec, is_png ? display.data() : image.values));
 }
 
 }  // namespace bvhlab

@@ -3,8 +3,10 @@
 
 #include <OpenImageIO/imageio.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -140,6 +142,43 @@ TEST_F(Image, FolderThatTakesNoFiles) {
     EXPECT_EQ(text.find("cannot write /proc/self/picture.exr: "), 0U) << text;
     const std::string png = refusal("/proc/self/picture.png", view_);
     EXPECT_EQ(png.find("cannot write /proc/self/picture.png: "), 0U) << png;
+}
+
+/// Lets no file grow beyond `bytes` while it lives, as if the disk were full.
+class FileSizeLimit {
+public:
+    explicit FileSizeLimit(rlim_t bytes) {
+        getrlimit(RLIMIT_FSIZE, &before_);
+        const rlimit limit{bytes, before_.rlim_max};
+        setrlimit(RLIMIT_FSIZE, &limit);
+        handler_ = std::signal(SIGXFSZ, SIG_IGN);
+    }
+    ~FileSizeLimit() {
+        setrlimit(RLIMIT_FSIZE, &before_);
+        std::signal(SIGXFSZ, handler_);
+    }
+
+private:
+    rlimit before_;
+    void (*handler_)(int);
+};
+
+TEST_F(Image, FullDiskLeavesTheOldFile) {
+    std::vector<float> noise(300 * 300 * 3);
+    for (std::size_t i = 0; i < noise.size(); ++i)
+        noise[i] = std::fmod(float(i) * 0.6180339F, 1.0F);
+    for (const char* name : {"picture.exr", "picture.png"}) {
+        write_image(folder_ / name, view_);
+        const auto size = fs::file_size(folder_ / name);
+        std::string text;
+        {
+            const FileSizeLimit limit(4096);
+            text = refusal(folder_ / name, {noise.data(), 300, 300, 3});
+        }
+        EXPECT_EQ(text, "cannot write " + (folder_ / name).string() + ": File too large");
+        EXPECT_EQ(fs::file_size(folder_ / name), size);
+    }
+    EXPECT_EQ(file_count(), 2U);
 }
 
 TEST_F(Image, DifferenceOfEqualPictures) {

@@ -205,6 +205,51 @@ TEST(SpatialBins, FindTheBestPlane) {
     }
 }
 
+TEST(SpatialSplit, ReferenceWithAnEmptyPartStaysWhole) {
+    // The box of the part with y >= 3 may be as loose as this: the triangle ends at x = 1 there.
+    const Mesh mesh = make_mesh({{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {3, 3, 0}, {4, 3, 0}, {3, 4, 0}},
+                                {{0, 1, 2}, {3, 4, 5}});
+    ReferenceSet set;
+    set.resize(2);
+    set.references[0] = {{{0, 3, 0}, {4, 4, 0}}, 0, 1};
+    set.references[1] = {mesh.box(1), 1, 1};
+    Token token;
+    SpatialDivision division;
+    decide_sides(set.view(0, 2), {0.0, 0, 2.0F}, mesh, 100, division, token);
+    EXPECT_EQ(division.sides[0], SpatialDivision::left_side);
+    EXPECT_EQ(division.sides[1], SpatialDivision::right_side);
+    EXPECT_EQ(division.duplicates(), 0U);
+}
+
+TEST(SpatialSplit, KeepsTheOrdersSorted) {
+    Token token;
+    for (const Mesh& mesh : {needles(300), needles(5000)}) {
+        const ReferenceSet set = sorted_references(mesh, token);
+        const ReferenceView node = set.view(0, set.size());
+        SpatialDivision division;
+        decide_sides(node, {0.0, 1, 0.4F}, mesh, mesh.size(), division, token);
+        ASSERT_GT(division.duplicates(), mesh.size() / 10);
+        ReferenceSet sides[2];
+        sides[0].resize(division.left_size);
+        sides[1].resize(division.right_size);
+        Array<std::uint32_t> ranks;
+        divide_space(node, division, ranks, sides[0].target(0, division.left_size),
+                     sides[1].target(0, division.right_size), token);
+        for (const ReferenceSet& side : sides) {
+            for (int axis = 0; axis < 3; ++axis) {
+                Array<std::uint32_t> order = side.orders[std::size_t(axis)];
+                EXPECT_TRUE(std::ranges::is_sorted(order, {}, [&](std::uint32_t position) {
+                    return doubled_centre(side.references[position], axis);
+                }));
+                std::ranges::sort(order);
+                for (std::uint32_t i = 0; i < order.size(); ++i) ASSERT_EQ(order[i], i);
+            }
+        }
+        for (const Reference& part : division.left_parts)
+            EXPECT_LE(part.box.upper.y, 0.4F) << "triangle " << part.triangle;
+    }
+}
+
 TEST(Sbvh, IsValidOnEveryShapeOfInput) {
     for (const Mesh& mesh : {random_soup(1), random_soup(2), random_soup(3), random_soup(4500),
                              needles(2), needles(1000), needles(100, 1e18F), needles(100, 1e-18F),

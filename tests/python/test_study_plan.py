@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plans: their variants, their checks and their JSON."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+import pytest
+from bvh_lab.native import core
+from bvh_lab.study.arguments import add_plan_arguments, plan_from_arguments
+from bvh_lab.study.plan import Plan, Variant
+from hypothesis import given
+from hypothesis import strategies as st
+
+
+def plan_of(*words: str) -> Plan:
+    parser = argparse.ArgumentParser()
+    add_plan_arguments(parser)
+    return plan_from_arguments(parser.parse_args(words))
+
+
+def test_variants_are_all_combinations_with_builders_slowest() -> None:
+    plan = Plan(builders=["lbvh", "sah"], branchings=[2, 8], reorders=[False, True])
+    names = [variant.name for variant in plan.variants()]
+    assert names[:4] == ["lbvh_2", "lbvh_2_reordered", "lbvh_8", "lbvh_8_reordered"]
+    assert len(set(names)) == len(names) == 8
+
+
+def test_variant_name_holds_its_device() -> None:
+    assert Variant("sah", 4, False, "opencl:a/b c").name == "sah_4_opencl-a-b-c"
+
+
+@pytest.mark.parametrize("preset", ["quick", "paper"])
+def test_presets_are_good_plans(preset: str) -> None:
+    plan = Plan.from_preset(preset)
+    plan.check(core.builders(), core.devices())
+    assert plan.preset_note().startswith(f"Preset {preset}")
+
+
+def test_paper_preset_has_the_papers_resolution() -> None:
+    plan = Plan.from_preset("paper")
+    assert (plan.width, plan.height, plan.traversal, plan.intersection) == (1024, 768, 3.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"builders": ["lbvh", "nope"]}, r"unknown builder 'nope'; there are: lbvh, .*sbvh"),
+        ({"builders": []}, "builders is empty"),
+        ({"builders": ["sah", "sah"]}, "builders names one twice"),
+        ({"branchings": [2, 3]}, "branching 3 is not known; it is 2, 4 or 8"),
+        ({"devices": ["gpu9"]}, "unknown device 'gpu9'; there are: cpu"),
+        ({"devices": ["opencl"]}, "device 'opencl' cannot be used: "),
+        ({"repeats": 2}, "repeats is 2; it must be from 3"),
+        ({"samples": 0}, "samples is 0"),
+        ({"views": 0}, "views is 0"),
+        ({"views": []}, "views is empty"),
+        ({"width": 64}, "64x0 needs both"),
+        ({"traversal": float("nan")}, "traversal is nan"),
+        ({"preset": "fast"}, "unknown preset 'fast'; there are: quick, paper"),
+        ({"params": {"nope": {}}}, "unknown builder 'nope'"),
+        ({"params": {"sbvh": {"nope": 1.0}}}, "builder 'sbvh' has no parameter 'nope'"),
+    ],
+)
+def test_bad_choices_are_named(changes: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        Plan(**changes).check(core.builders(), core.devices())
+
+
+def test_parameter_out_of_range_is_named() -> None:
+    sbvh = next(builder for builder in core.builders() if builder["id"] == "sbvh")
+    parameter = sbvh["parameters"][0]
+    plan = Plan(params={"sbvh": {parameter["name"]: 2.0 * parameter["maximum"] + 1.0}})
+    with pytest.raises(ValueError, match=f"sbvh.{parameter['name']} is .*; it must be from"):
+        plan.check(core.builders(), core.devices())
+
+
+plans = st.builds(
+    Plan,
+    builders=st.lists(st.text()),
+    branchings=st.lists(st.integers()),
+    reorders=st.lists(st.booleans()),
+    params=st.dictionaries(
+        st.text(), st.dictionaries(st.text(), st.floats(allow_nan=False, allow_infinity=False))
+    ),
+    views=st.integers() | st.lists(st.text()),
+    pictures=st.booleans(),
+    seed=st.integers(),
+    traversal=st.floats(allow_nan=False, allow_infinity=False),
+)
+
+
+@given(plans)
+def test_json_gives_the_same_plan(plan: Plan) -> None:
+    assert Plan.from_json(plan.to_json()) == plan
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('{"colour": 1}', "Plan has no field 'colour'"),
+        ('{"builders": "sah"}', "Plan.builders must be a list"),
+        ('{"branchings": [2, "4"]}', r"Plan.branchings\[1\] must be of type int"),
+        ('{"views": 1.5}', "Plan.views must be"),
+        ("[]", "Plan must be an object"),
+    ],
+)
+def test_bad_json_is_named(text: str, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        Plan.from_json(text)
+
+
+def test_arguments_change_the_preset() -> None:
+    plan = plan_of(
+        *[
+            "--preset",
+            "paper",
+            "--builders",
+            "sah",
+            "--branching",
+            "8,2",
+            "--views",
+            "2",
+            "--samples",
+            "7",
+        ],
+        *["--reorder", "both", "--no-embree", "--param", "sbvh.alpha=1e-4", "--threads", "1"],
+    )
+    assert (plan.width, plan.builders, plan.branchings) == (1024, ["sah"], [8, 2])
+    assert (plan.views, plan.samples, plan.reorders) == (2, 7, [False, True])
+    assert (plan.embree, plan.pictures, plan.threads) == (False, True, 1)
+    assert plan.params == {"sbvh": {"alpha": 1e-4}}
+
+
+def test_arguments_name_views_and_resolutions() -> None:
+    assert plan_of("--views", "Nave, Door").views == ["Nave", "Door"]
+    plan = plan_of("--preset", "paper", "--resolution", "640x480")
+    assert (plan.width, plan.height) == (640, 480)
+    plan = plan_of("--preset", "paper", "--resolution", "320")
+    assert (plan.width, plan.height, plan.long_side) == (0, 0, 320)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--branching two", "--branching: 'two' is not a whole number"),
+        ("--branching 3", "branching 3 is not known"),
+        ("--resolution 5x5x5", "--resolution is like 512x384"),
+        ("--resolution 0x64", "--resolution is like 512x384"),
+        ("--param alpha=1", "--param is like sbvh.alpha=1e-5"),
+        ("--param sbvh.alpha=much", "--param is like sbvh.alpha=1e-5"),
+        ("--builders ,", "builders is empty"),
+    ],
+)
+def test_bad_arguments_are_named(words: str, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        plan_of(*words.split())

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rows: what they compute, and JSON and CSV of them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import pytest
+from bvh_lab.study.plan import Plan
+from bvh_lab.study.results import (
+    Errors,
+    Machine,
+    Measurement,
+    Picture,
+    Result,
+    Row,
+    Subject,
+    Tree,
+    csv_record,
+    ratio,
+    spread,
+)
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+
+def timed(view: str, rays: int, seconds: list[float], **more: int) -> Measurement:
+    """Primary rays whose repeats took ``seconds``, all of it traversal."""
+    zeros = [0.0] * len(seconds)
+    times = {"key_seconds": zeros, "sort_seconds": zeros, "traverse_seconds": seconds}
+    return Measurement(view, "primary", rays, **more, **times)
+
+
+def row_of(*measurements: Measurement, name: str = "sah_2") -> Row:
+    return Row(name, "SAH", "bvh_lab", "sah", 2, False, "cpu", measurements=[*measurements])
+
+
+def test_spread_is_median_and_quartiles() -> None:
+    assert spread([5.0, 1.0, 3.0, 2.0, 4.0]) == (2.0, 3.0, 4.0)
+    assert spread([3.0]) == (3.0, 3.0, 3.0)
+    assert spread([5.0, 1.0, 3.0, 2.0, 4.0]).half_percent == pytest.approx(100.0 / 3.0)
+
+
+def test_speed_is_all_rays_over_the_sum_of_the_views_medians() -> None:
+    row = row_of(
+        timed("a", 1_000_000, [0.1, 0.3, 0.2]),  # quartiles 0.15, 0.2, 0.25
+        timed("b", 3_000_000, [0.6, 0.6, 0.6]),
+    )
+    speed = row.speed("primary")
+    assert speed is not None
+    assert speed.median == pytest.approx(4.0 / 0.8)
+    assert (speed.low, speed.high) == (pytest.approx(4.0 / 0.85), pytest.approx(4.0 / 0.75))
+    assert row.speed("shadow") is None
+
+
+def test_seconds_hold_keys_sort_and_traversal() -> None:
+    parts = {"key_seconds": [1.0], "sort_seconds": [2.0], "traverse_seconds": [4.0]}
+    assert Measurement("a", "primary", 10, **parts).seconds == [7.0]
+
+
+def test_counters_are_per_ray_over_all_views() -> None:
+    row = row_of(
+        Measurement("a", "primary", 10, node_visits=100, triangle_tests=30),
+        Measurement("b", "primary", 30, node_visits=20, triangle_tests=10),
+    )
+    assert row.per_ray("node_visits", "primary") == 3.0
+    assert row.per_ray("triangle_tests", "primary") == 1.0
+    assert row.per_ray("node_visits", "diffuse") is None
+    assert row_of(Measurement("a", "primary", 10)).per_ray("node_visits", "primary") is None
+
+
+def test_errors_add_up() -> None:
+    row = row_of(
+        Measurement("a", "primary", 9, errors=Errors(4, 1, 0, 1, 1e-7)),
+        Measurement("a", "shadow", 9, errors=Errors(5, 0, 2, 0, 3e-7)),
+    )
+    assert row.errors() == Errors(9, 1, 2, 1, 3e-7)
+    assert row.errors().wrong == 4
+
+
+def test_ratio_to_a_baseline() -> None:
+    fast = row_of(timed("a", 1000, [1.0] * 3))
+    slow = row_of(timed("a", 1000, [4.0] * 3))
+    assert ratio(fast, slow, "primary") == pytest.approx(4.0)
+    assert ratio(fast, slow, "shadow") is None
+
+
+def test_only_our_own_rows_can_disagree() -> None:
+    row = row_of(timed("a", 10, [1.0] * 3, differing_rays=1))
+    assert row.disagrees()
+    row.system = "embree"
+    assert not row.disagrees()
+
+
+def test_a_picture_difference_is_a_disagreement() -> None:
+    row = row_of()
+    row.pictures = [Picture("a", 2, 2, 1, 8, 0.1, largest_difference=0.5, differing_pixels=1)]
+    assert row.disagrees()
+
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+counts = st.integers(0, 2**63)
+seconds = st.lists(finite)
+rows = st.builds(
+    Row,
+    name=st.text(),
+    error=st.text(),
+    tree=st.none() | st.builds(Tree, nodes=counts, average_leaf_size=finite, cost=finite),
+    build_seconds=seconds,
+    measurements=st.lists(
+        st.builds(
+            Measurement,
+            rays=counts,
+            node_visits=st.none() | counts,
+            triangle_tests=st.none() | counts,
+            errors=st.builds(Errors, judged=counts, largest_t_error=finite),
+            traverse_seconds=seconds,
+        ),
+        max_size=3,
+    ),
+    pictures=st.lists(st.builds(Picture, largest_difference=finite, seconds=finite), max_size=3),
+)
+machines = st.builds(
+    Machine,
+    devices=st.lists(st.dictionaries(st.text(), st.text() | st.booleans()), max_size=2),
+    features=st.dictionaries(st.text(), st.booleans()),
+    memory_gib=finite,
+)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.builds(
+        Result,
+        plan=st.just(Plan(params={"sbvh": {"alpha": 1e-5}}, views=["Nave"])),
+        subject=st.builds(Subject),
+        machine=machines,
+        seconds=finite,
+        rows=st.lists(rows, max_size=3),
+        notes=st.lists(st.text()),
+        format=st.just(1),
+    )
+)
+def test_json_gives_the_same_rows(result: Result) -> None:
+    assert Result.from_json(result.to_json()) == result
+
+
+def empty_result() -> Result:
+    subject = Subject("s", "", "mesh file", 0, 1, 3, 1, 0, ["a"], "")
+    machine = Machine("cpu", 2, 1.0, "Linux", "3", "1", "", "0", [], {}, "")
+    return Result(Plan(), subject, machine, started="2026-01-01T00:00:00+00:00")
+
+
+def test_results_of_another_format_are_refused() -> None:
+    text = empty_result().to_json().replace('"format": 1', '"format": 99')
+    with pytest.raises(ValueError, match="results of format 99; this reads 1"):
+        Result.from_json(text)
+
+
+def test_a_row_with_a_bad_field_is_named() -> None:
+    result = empty_result()
+    result.rows = [row_of()]
+    plain = json.loads(result.to_json())
+    plain["rows"][0]["branching"] = "two"
+    with pytest.raises(ValueError, match=r"Result.rows\[0\].branching must be of type int"):
+        Result.from_json(json.dumps(plain))
+
+
+def test_csv_has_a_line_per_row_with_full_precision() -> None:
+    result = empty_result()
+    result.rows = [row_of(timed("a", 10, [0.1, 0.3, 0.2])), row_of(name='with "quotes", commas')]
+    lines = list(csv.DictReader(io.StringIO(result.to_csv())))
+    assert [line["name"] for line in lines] == ["sah_2", 'with "quotes", commas']
+    speed = result.rows[0].speed("primary")
+    assert speed is not None and float(lines[0]["primary_mrays_per_second"]) == speed.median
+    assert lines[0]["nodes"] == lines[1]["primary_mrays_per_second"] == ""
+    assert list(lines[0]) == list(csv_record(result.rows[0]))
+
+
+def test_an_unknown_row_is_named() -> None:
+    result = empty_result()
+    result.rows = [row_of()]
+    assert result.row("sah_2") is result.rows[0]
+    with pytest.raises(ValueError, match="no row 'x'; there are: sah_2"):
+        result.row("x")

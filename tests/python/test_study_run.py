@@ -1,0 +1,275 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whole studies of a small scene with the real core."""
+
+from __future__ import annotations
+
+import threading
+import time
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from bvh_lab.native import core
+from bvh_lab.study import run
+from bvh_lab.study.job import Job
+from bvh_lab.study.progress import Event, RowChanged, Step
+from bvh_lab.study.results import KINDS, Result
+from bvh_lab.study.run import Study, compare
+from bvh_lab.study.scene import Material
+from study_samples import sample_scene, small_plan
+
+EMBREE = core.embree()["available"]
+
+
+class Double:
+    """The real core with some of its functions replaced, to see failures handled."""
+
+    def __init__(self, **changes: Any) -> None:
+        self._changes = changes
+
+    def __getattr__(self, name: str) -> Any:
+        return self._changes.get(name) or getattr(core, name)
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    return compare(sample_scene(), small_plan(reorders=[False, True]), host="pytest")
+
+
+def test_every_variant_has_its_row(study: Study) -> None:
+    names = [row.name for row in study.result.rows if row.system == "bvh_lab"]
+    assert names == [variant.name for variant in study.result.plan.variants()]
+    assert not study.result.failed() and not study.result.cancelled
+    assert study.result.reference == "lbvh_2"
+
+
+def test_rows_hold_the_tree_as_the_core_tells_it(study: Study) -> None:
+    row, plan, scene = study.result.row("sah_8"), study.result.plan, sample_scene()
+    bvh = core.build(core.Mesh(scene.vertices, scene.triangles), "sah", branching=8)
+    assert row.tree is not None and row.label == "SAH"
+    assert row.tree.nodes == bvh.stats["nodes"] and row.tree.bytes == bvh.stats["bytes"]
+    assert row.tree.cost == bvh.cost(plan.traversal, plan.intersection)
+    assert len(row.build_seconds) == plan.build_repeats and row.threads >= 1
+
+
+def test_every_row_answers_alike(study: Study) -> None:
+    rows = [row for row in study.result.rows if row.system == "bvh_lab"]
+    hashes = {tuple(m.hits_sha256 for m in row.measurements) for row in rows}
+    assert len(hashes) == 1
+    assert all(row.differing_rays() == 0 and row.picture_difference() == 0.0 for row in rows)
+
+
+def test_every_row_is_measured_and_judged(study: Study) -> None:
+    plan, views = study.result.plan, study.result.subject.views
+    assert len(views) == plan.views == 2
+    for row in study.result.rows:
+        assert [(m.view, m.kind) for m in row.measurements] == [
+            (v, k) for v in views for k in KINDS
+        ]
+        for measurement in row.measurements:
+            assert len(measurement.seconds) == plan.repeats and min(measurement.seconds) > 0.0
+            assert measurement.errors.judged == min(plan.judged_rays, measurement.rays)
+            assert 0 < measurement.hits <= measurement.rays
+            assert (measurement.node_visits is None) == (row.system == "embree")
+        assert row.errors().wrong == 0
+        assert all(row.speed(kind) for kind in KINDS)
+
+
+def test_secondary_rays_start_at_hits_only(study: Study) -> None:
+    first, shadow, diffuse = study.result.rows[0].measurements[:3]
+    assert first.rays == 48 * 36
+    assert shadow.rays == diffuse.rays == first.hits < first.rays
+
+
+def test_reordering_costs_keys_and_sorting(study: Study) -> None:
+    for name, reordered in (("sah_2", False), ("sah_2_reordered", True)):
+        row = study.result.row(name)
+        assert row.reorder == reordered
+        assert all((sum(m.sort_seconds) > 0.0) == reordered for m in row.measurements)
+
+
+def test_both_orders_share_one_build(study: Study) -> None:
+    plain, reordered = study.result.row("sah_2"), study.result.row("sah_2_reordered")
+    assert plain.build_seconds == reordered.build_seconds
+
+
+@pytest.mark.skipif(not EMBREE, reason=f"Embree: {core.embree()['reason']}")
+def test_embree_stands_beside(study: Study) -> None:
+    rows = [row for row in study.result.rows if row.system == "embree"]
+    assert [row.name for row in rows] == ["embree_high_robust", "embree_high_fast"]
+    assert rows[0].differing_rays() == 0 and rows[0].tree is None and not rows[0].pictures
+    assert all(row.build_seconds for row in rows)
+
+
+def test_pictures_of_equal_variants_share_memory(study: Study) -> None:
+    first, *rest = study.result.subject.views
+    assert len(study.pictures) == 8 * 2
+    picture = study.pictures["lbvh_2", first]
+    assert picture.shape == (36, 48, 3) and picture.dtype == np.float32 and picture.max() > 0.0
+    assert study.pictures["sah_8", first] is picture
+    assert study.pictures["sah_8", rest[0]] is not picture
+
+
+def test_result_goes_to_json_and_back(study: Study) -> None:
+    assert Result.from_json(study.result.to_json()) == study.result
+
+
+def test_result_names_scene_and_machine(study: Study) -> None:
+    result, scene = study.result, sample_scene()
+    assert result.subject.sha256 == scene.digest() and result.subject.triangles == 768
+    assert result.machine.host == "pytest" and result.machine.version == core.__version__
+    assert result.machine.cpu and result.machine.cores >= 1
+    assert "A note of the extraction." in result.notes
+
+
+def test_same_seed_same_answers(study: Study) -> None:
+    again = compare(sample_scene(), small_plan(builders=["sah"], branchings=[4], threads=1))
+    ours, theirs = again.result.rows[0], study.result.rows[0]
+    assert [m.hits_sha256 for m in ours.measurements] == [
+        m.hits_sha256 for m in theirs.measurements
+    ]
+    other = compare(sample_scene(), small_plan(builders=["sah"], branchings=[4], seed=1))
+    hashes = [m.hits_sha256 for m in other.result.rows[0].measurements]
+    assert hashes[2] != ours.measurements[2].hits_sha256  # the diffuse rays are random
+
+
+def test_events_tell_progress_and_rows() -> None:
+    events: list[Event] = []
+    plan = small_plan(builders=["sah"], embree=False)
+    result = compare(sample_scene(), plan, on_event=events.append).result
+    steps = [event for event in events if isinstance(event, Step)]
+    fractions = [step.fraction for step in steps]
+    assert fractions == sorted(fractions) and 0.8 < fractions[-1] <= 1.0
+    assert steps[0].stage == "building SAH 2-wide" and all(s.seconds_left >= 0.0 for s in steps)
+    finished = [event.row for event in events if isinstance(event, RowChanged) and event.finished]
+    assert finished == result.rows
+
+
+def test_no_more_than_asked_for() -> None:
+    plan = small_plan(
+        builders=["lbvh"], branchings=[4], embree=False, pictures=False, judged_rays=0
+    )
+    study = compare(sample_scene(), plan)
+    (row,) = study.result.rows
+    assert not study.pictures and not row.pictures and row.picture_difference() is None
+    assert row.errors().judged == 0 and row.speed("diffuse")
+
+
+def test_a_view_of_nothing_has_primary_rays_only() -> None:
+    scene = sample_scene()
+    scene.cameras[0].to_world[:3, 0] *= -1.0  # turned round about its up axis
+    scene.cameras[0].to_world[:3, 2] *= -1.0
+    result = compare(scene, small_plan(views=1, builders=["sah"])).result
+    assert not result.failed()
+    assert [m.kind for m in result.rows[0].measurements] == ["primary"]
+    assert (
+        "View auto_1 has no diffuse and shadow rays: no primary ray hit anything." in result.notes
+    )
+    assert Result.from_json(result.to_json()) == result
+
+
+def test_trees_that_do_not_fit_are_measured_in_groups() -> None:
+    plan = small_plan(memory_gib=1e-9, embree=False)
+    result = compare(sample_scene(), plan).result
+    assert [row.group for row in result.rows] == [1, 2, 3, 4]
+    assert not result.failed() and all(row.speed("diffuse") for row in result.rows)
+    assert any("measured in 4 groups" in note for note in result.notes)
+
+
+def failing_build(mesh: Any, builder: str, **more: Any) -> Any:
+    if builder == "sah":
+        raise RuntimeError("the SAH builder broke")
+    return core.build(mesh, builder, **more)
+
+
+def test_a_variant_that_fails_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "load", lambda: Double(build=failing_build))
+    plan = small_plan(builders=["sah", "lbvh"], embree=False)
+    result = compare(sample_scene(), plan).result
+    assert [row.error for row in result.rows] == ["the SAH builder broke"] * 2 + [""] * 2
+    assert result.reference == "lbvh_2" and result.rows[2].speed("primary")
+    assert [row.name for row in result.failed()] == ["sah_2", "sah_8"]
+
+
+def test_a_variant_that_answers_otherwise_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    def lying_trace(bvh: Any, *arguments: Any, **more: Any) -> Any:
+        hit = core.trace(bvh, *arguments, **more)
+        if bvh.builder != "sah" or hit.t is None:
+            return hit
+        names = ("occluded", "t", "u", "v", "triangle", "node_visits", "triangle_tests")
+        names += ("key_seconds", "sort_seconds", "traverse_seconds")
+        lie = SimpleNamespace(**{name: getattr(hit, name) for name in names})
+        lie.t = np.where(hit.occluded, np.nextafter(hit.t, np.float32(0)), hit.t)
+        return lie
+
+    monkeypatch.setattr(run, "load", lambda: Double(trace=lying_trace))
+    result = compare(sample_scene(), small_plan(branchings=[2], embree=False)).result
+    assert [row.name for row in result.failed()] == ["sah_2"]
+    first = result.row("sah_2").measurements[0]
+    assert first.differing_rays == first.hits > 0
+
+
+def test_missing_embree_is_a_failed_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    absent = {"available": False, "version": "", "reason": "no libembree"}
+    monkeypatch.setattr(run, "load", lambda: Double(embree=lambda: absent))
+    result = compare(sample_scene(), small_plan(builders=["sah"])).result
+    assert [row.system for row in result.failed()] == ["embree", "embree"]
+    assert "Embree is missing: no libembree; leave it out with" in result.failed()[0].error
+    assert result.row("sah_8").speed("primary")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"triangles": np.zeros((0, 3), np.uint32)}, "no triangles"),
+        ({"triangles": np.uint32([[0, 1, 9999]]), "material_index": np.uint32([0])}, "triangle 0"),
+        ({"cameras": []}, "has no camera"),
+        ({"materials": [Material("one")]}, "material"),
+    ],
+)
+def test_bad_scenes_are_refused(changes: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        compare(sample_scene(**changes), small_plan())
+
+
+def test_unknown_views_are_named() -> None:
+    with pytest.raises(ValueError, match="unknown view 'Nave'; there are: auto_1, auto_2, auto_3"):
+        compare(sample_scene(), small_plan(views=["Nave"]))
+
+
+def test_a_job_polls_and_ends() -> None:
+    job = Job(sample_scene(), small_plan(builders=["sah"]))
+    while job.running:
+        job.wait(0.01)
+        job.poll()
+    job.poll()
+    assert job.fraction > 0.5 and job.stage and job.seconds_left >= 0.0
+    assert not job.study.result.failed()
+
+
+def test_a_job_hands_over_its_error() -> None:
+    job = Job(sample_scene(cameras=[]), small_plan())
+    job.wait(60.0)
+    with pytest.raises(ValueError, match="has no camera"):
+        _ = job.study
+
+
+def test_cancel_keeps_the_rows_measured() -> None:
+    job = Job(sample_scene(), small_plan(repeats=1000, embree=False))
+    while job.fraction < 0.05 or not job.stage.startswith("timing"):
+        job.wait(0.005)
+        job.poll()
+    start = time.perf_counter()
+    job.cancel()
+    result = job.study.result
+    assert time.perf_counter() - start < 0.5
+    assert result.cancelled and len(result.rows) == 4
+    assert result.rows[0].speed("primary") and not result.failed()
+    assert Result.from_json(result.to_json()) == result
+
+
+def test_a_job_leaves_no_thread() -> None:
+    before = threading.active_count()
+    job = Job(sample_scene(), small_plan(builders=["lbvh"], embree=False, pictures=False))
+    assert job.study.result.rows and threading.active_count() == before
