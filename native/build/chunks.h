@@ -19,21 +19,31 @@ inline std::size_t chunk_count(std::size_t count) {
     return (count + chunk_size - 1) / chunk_size;
 }
 
+/// tbb::parallel_for over [0, count), to be used within a task. A thread that waits here takes up
+/// no other node's work, so that stacks stay shallow. The loop has a context of its own: otherwise
+/// oneTBB, when another task has thrown, would leave this loop early and *without* an exception,
+/// and the caller would go on with half a result.
+template <class Body>
+void parallel_for_within_task(std::size_t count, Body&& body) {
+    tbb::task_group_context context(tbb::task_group_context::isolated);
+    tbb::this_task_arena::isolate([&] {
+        tbb::parallel_for(std::size_t(0), count, std::size_t(1), body, tbb::auto_partitioner(),
+                          context);
+    });
+}
+
 /// Calls `body(begin, end)` for each chunk of [0, count), in parallel where there are several, and
-/// checks the token before each. A thread that waits here takes up no other node's work, so that
-/// stacks stay shallow.
+/// checks the token before each.
 template <class Body>
 void for_chunks(std::size_t count, const Token& token, Body&& body) {
     if (count <= chunk_size) {
         if (count > 0) body(std::size_t(0), count);
         return;
     }
-    tbb::this_task_arena::isolate([&] {
-        tbb::parallel_for(std::size_t(0), chunk_count(count), [&](std::size_t chunk) {
-            token.check();
-            const std::size_t begin = chunk * chunk_size;
-            body(begin, std::min(count, begin + chunk_size));
-        });
+    parallel_for_within_task(chunk_count(count), [&](std::size_t chunk) {
+        token.check();
+        const std::size_t begin = chunk * chunk_size;
+        body(begin, std::min(count, begin + chunk_size));
     });
 }
 

@@ -209,9 +209,8 @@ void divide_space(const ReferenceView& node, const SpatialDivision& division,
             divide_order(node, division, axis, ranks, left, right, token);
         return;
     }
-    tbb::this_task_arena::isolate([&] {
-        tbb::parallel_for(
-            0, 3, [&](int axis) { divide_order(node, division, axis, ranks, left, right, token); });
+    parallel_for_within_task(3, [&](std::size_t axis) {
+        divide_order(node, division, int(axis), ranks, left, right, token);
     });
 }
 

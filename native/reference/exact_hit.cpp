@@ -6,29 +6,12 @@
 #include <glm/vec3.hpp>
 #include <limits>
 
+#include "scene/exact_volume.h"
+
 namespace bvhlab {
 namespace {
 
 using Double3 = glm::dvec3;
-
-/// Adds det(x, y, z).
-void add_determinant(ExactSum& sum, const glm::vec3& x, const glm::vec3& y, const glm::vec3& z) {
-    for (int i = 0; i < 3; ++i) {
-        const int j = (i + 1) % 3;
-        const int k = (i + 2) % 3;
-        sum.add_product(x[i], y[j], z[k]);
-        sum.add_product(-x[i], y[k], z[j]);
-    }
-}
-
-/// det(direction, p - origin, q - origin), without rounding.
-ExactSum exact_volume(const Ray& ray, const glm::vec3& p, const glm::vec3& q) {
-    ExactSum volume;
-    add_determinant(volume, ray.direction, p, q);
-    add_determinant(volume, -ray.direction, p, ray.origin);
-    add_determinant(volume, -ray.direction, ray.origin, q);
-    return volume;
-}
 
 double greatest(const Double3& v) {
     return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
@@ -84,7 +67,8 @@ bool line_meets(const Ray& ray, const Triangle& triangle) {
     }
     for (int i = 0; i < 3 && !(positive && negative); ++i) {
         if (std::abs(volumes[i].value) > volumes[i].bound) continue;
-        const int sign = exact_volume(ray, corners[i], corners[(i + 1) % 3]).sign();
+        const int sign =
+            exact_volume(ray.origin, ray.direction, corners[i], corners[(i + 1) % 3]).sign();
         positive |= sign > 0;
         negative |= sign < 0;
     }
@@ -145,9 +129,12 @@ bool nearer(const Crossing& a, const Crossing& b) {
 
 HitOf<double> make_hit(const Ray& ray, const Triangle& triangle, std::uint32_t index,
                        const Crossing& crossing) {
+    const auto volume_of = [&](const glm::vec3& p, const glm::vec3& q) {
+        return exact_volume(ray.origin, ray.direction, p, q).value();
+    };
     const double determinant = crossing.determinant.value();
-    return {crossing.t, exact_volume(ray, triangle.c, triangle.a).value() / determinant,
-            exact_volume(ray, triangle.a, triangle.b).value() / determinant, index};
+    return {crossing.t, volume_of(triangle.c, triangle.a) / determinant,
+            volume_of(triangle.a, triangle.b) / determinant, index};
 }
 
 }  // namespace bvhlab

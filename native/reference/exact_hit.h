@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "reference/exact_sum.h"
+#include "base/exact_sum.h"
 #include "scene/mesh.h"
 #include "trace/ray.h"
 

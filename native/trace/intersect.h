@@ -14,17 +14,17 @@ namespace bvhlab {
 
 /// How boxes and triangles are intersected, and why a hit depends on mesh and ray alone.
 ///
-/// A hit is *decided in double*: the watertight test of Woop, Benthin, Wald 2013 on the original
-/// float vertices, edges and corners included. Rays through a shared edge get edge functions of
-/// exactly opposite sign from its two triangles, so nothing slips between them. A float version of
-/// the test runs first, over many triangles at once, and only discards triangles whose edge
-/// functions differ in sign by more than their rounding errors (EdgeFilter); it never decides a
-/// hit.
+/// Whether the ray's line meets a triangle is *decided exactly*, as real arithmetic on the given
+/// floats would, edges and corners included: nothing slips between two triangles that share an
+/// edge. The test is the watertight one of Woop, Benthin, Wald 2013 on the original vertices, its
+/// edge functions in double; one within its rounding error of 0 is evaluated without rounding. A
+/// float version of the test runs first, over many triangles at once, and only discards triangles
+/// whose edge functions differ in sign by more than their rounding errors; it never decides a hit.
 ///
 /// Box tests are conservative (after Ize 2013), with u = 2^-24: the distance (plane - origin) *
 /// inverse carries three roundings and the padded inverse a fourth, a relative error below 4.1 u.
 /// Near planes use inverse * (1 - 8u) and far planes inverse * (1 + 8u), so for t >= 0 the computed
-/// interval contains the exact one, with slack to spare for the error of a hit decided in double.
+/// interval contains the exact one, with slack to spare for the rounding of the hit's own distance.
 /// Rounding is monotone, so a larger box has a computed interval that contains the smaller one's.
 ///
 /// The hit's distance is clamped to the computed interval of its triangle's *own box*, and a
@@ -122,6 +122,10 @@ inline PreparedRay::PreparedRay(const Ray& ray, const Box& bounds) : origin(ray.
     projection_error = 8.0F * u * reach;
 }
 
+/// The edge function of the edge between two corners without rounding errors, for the rare case
+/// that double cannot tell its sign: det(direction, from - origin, to - origin) / direction[kz].
+double exact_edge_function(const PreparedRay& ray, const float (&from)[3], const float (&to)[3]);
+
 /// Computed interval [near, far] in which the ray is inside a box; `planes` by row of
 /// WideNode::planes.
 inline void box_interval(const PreparedRay& ray, const float (&planes)[6], float& near,
@@ -136,25 +140,47 @@ inline void box_interval(const PreparedRay& ray, const float (&planes)[6], float
     }
 }
 
-/// Decides in double whether the ray meets the triangle; t (scaled), u, v are those of the answer.
-/// `corners` is [corner a, b, c][axis]. Zero-area triangles are never met.
-inline bool meets_triangle(const PreparedRay& ray, const float (&corners)[3][3], float& t, float& u,
-                           float& v) {
-    // Corners relative to the origin, sheared so that the ray runs along the z axis.
-    double x[3], y[3], z[3];
+/// Edge functions of a triangle: twice the signed areas that the ray spans with each edge once all
+/// is sheared so that it runs along the z axis; weights of the corners a, b, c up to a common
+/// factor. Signs are exact, values are within some 2^-50 of the largest.
+struct EdgeFunctions {
+    double a, b, c;
+    double z[3];  ///< depths of the corners
+};
+
+inline EdgeFunctions edge_functions(const PreparedRay& ray, const float (&corners)[3][3]) {
+    EdgeFunctions edges;
+    double x[3], y[3], largest = 0.0;
     for (int corner = 0; corner < 3; ++corner) {
         const float* position = corners[corner];
-        z[corner] = double(position[ray.kz]) - double(ray.origin[ray.kz]);
-        x[corner] =
-            double(position[ray.kx]) - double(ray.origin[ray.kx]) - ray.shear_xd * z[corner];
-        y[corner] =
-            double(position[ray.ky]) - double(ray.origin[ray.ky]) - ray.shear_yd * z[corner];
+        const double z = double(position[ray.kz]) - double(ray.origin[ray.kz]);
+        x[corner] = double(position[ray.kx]) - double(ray.origin[ray.kx]) - ray.shear_xd * z;
+        y[corner] = double(position[ray.ky]) - double(ray.origin[ray.ky]) - ray.shear_yd * z;
+        edges.z[corner] = z;
+        largest = std::max({largest, std::abs(x[corner]), std::abs(y[corner])});
     }
+    edges.a = x[2] * y[1] - y[2] * x[1];
+    edges.b = x[0] * y[2] - y[0] * x[2];
+    edges.c = x[1] * y[0] - y[1] * x[0];
 
-    // Edge functions: signed areas that the ray spans with each edge, proportional to barycentrics.
-    const double a = x[2] * y[1] - y[2] * x[1];
-    const double b = x[0] * y[2] - y[0] * x[2];
-    const double c = x[1] * y[0] - y[1] * x[0];
+    // The error bound of the float filter (traverse.cpp), with 2^-53 for 2^-24.
+    const double error = double(ray.projection_error) * 0x1p-29;
+    const double bound = (4.0 * error + 0x1p-50 * largest) * largest + 2.0 * error * error;
+    const auto decide = [&](double& value, int from, int to) {
+        if (std::abs(value) <= bound) value = exact_edge_function(ray, corners[from], corners[to]);
+    };
+    decide(edges.a, 2, 1);
+    decide(edges.b, 0, 2);
+    decide(edges.c, 1, 0);
+    return edges;
+}
+
+/// Whether the ray meets the triangle; then t (scaled), u and v are the answer's. `corners` is
+/// [corner a, b, c][axis]. Triangles without area are never met, nor is one in whose plane the ray
+/// runs.
+inline bool meets_triangle(const PreparedRay& ray, const float (&corners)[3][3], float& t, float& u,
+                           float& v) {
+    const auto [a, b, c, z] = edge_functions(ray, corners);
     if ((a < 0.0 || b < 0.0 || c < 0.0) && (a > 0.0 || b > 0.0 || c > 0.0)) return false;
     const double area = a + b + c;
     if (area == 0.0) return false;

@@ -12,7 +12,7 @@
 #include "base/parallel.h"
 #include "meshes.h"
 #include "reference/exact_hit.h"
-#include "reference/exact_sum.h"
+#include "base/exact_sum.h"
 
 namespace bvhlab {
 namespace {

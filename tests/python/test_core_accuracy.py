@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How near to the exact answer hits are, and where they may differ from it.
+"""Hits are those of real arithmetic on the given floats, also on edges and corners.
 
-The traversal decides in double, with a relative error of some 2^-50 in the edge functions; the
-judge decides exactly. They may differ only where the ray passes an edge within that error, and t
-may differ by float rounding alone.
+The traversal and the judge are both held against Python's fractions; t differs by rounding alone.
 """
 
 from __future__ import annotations
@@ -15,7 +13,7 @@ import pytest
 from bvh_lab.native import core
 
 
-def edge_margin(corners: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> float:
+def edge_margin(corners: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> Fraction | int:
     """How far inside its triangle the ray passes, exactly: the least edge volume over the sum.
 
     0 on an edge, negative outside; in units of barycentric coordinates.
@@ -33,7 +31,7 @@ def edge_margin(corners: np.ndarray, origin: np.ndarray, direction: np.ndarray) 
 
     volumes = [volume(b, c), volume(c, a), volume(a, b)]
     total = sum(volumes)
-    return float(min(v / total for v in volumes)) if total else 0.0
+    return min(v / total for v in volumes) if total else -1
 
 
 def rays_at_edges(count: int, seed: int, offset: float) -> tuple[np.ndarray, ...]:
@@ -47,24 +45,22 @@ def rays_at_edges(count: int, seed: int, offset: float) -> tuple[np.ndarray, ...
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e3, 1e6])
-def test_hits_differ_from_the_exact_answer_only_within_rounding_of_an_edge(offset: float) -> None:
+def test_hits_at_edges_are_the_exact_ones(offset: float) -> None:
     corners, origins, directions = rays_at_edges(3000, seed=7, offset=offset)
-    differ = 0
+    on_an_edge = 0
     for corner, origin, direction in zip(corners, origins, directions, strict=True):
         mesh = core.Mesh(corner, np.array([[0, 1, 2]], np.uint32))
         bvh = core.build(mesh, "lbvh", branching=2)
         hit = core.trace(bvh, origin[None], direction[None])
         judge = core.brute_force(mesh, origin[None], direction[None])
         margin = edge_margin(corner, origin, direction)
-        # The judge is exact; its margin says so.
-        assert bool(judge.occluded[0]) == (margin >= 0 and judge.t[0] >= 0) or np.isinf(judge.t[0])
-        if hit.occluded[0] != judge.occluded[0]:
-            differ += 1
-            assert abs(margin) < 1e-12
-        elif hit.occluded[0]:
+        on_an_edge += margin == 0
+        # Rays run towards their triangles, so t is positive and the margin decides.
+        assert bool(judge.occluded[0]) == (margin >= 0)
+        assert bool(hit.occluded[0]) == (margin >= 0)
+        if hit.occluded[0]:
             assert abs(hit.t[0] - judge.t[0]) <= 2 * np.spacing(np.float32(judge.t[0]))
-    # Far from the origin coordinates are coarse and many rays pass an edge exactly.
-    assert differ <= (3 if offset < 1e5 else 300)
+    assert on_an_edge or offset < 1e5  # there, where coordinates are coarse, it happens
 
 
 def test_no_ray_aimed_at_a_vertex_or_edge_of_a_closed_mesh_gets_through() -> None:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "reference/exact_sum.h"
+#include "base/exact_sum.h"
 
 #include <cmath>
 #include <cstddef>
