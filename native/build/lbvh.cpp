@@ -54,6 +54,8 @@ struct SubtreeBuilder {
             token.check();
             tbb::parallel_invoke([&] { left = build(node + 1, first, split); },
                                  [&] { right = build(right_node, split + 1, last); });
+            // Once another task has thrown, oneTBB leaves nested calls early without an exception.
+            token.check();
         }
         bvh.children[node] = {left, right};
         bvh.boxes[node] = unite(bvh.boxes[left], bvh.boxes[right]);

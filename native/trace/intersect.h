@@ -150,21 +150,24 @@ struct EdgeFunctions {
 
 inline EdgeFunctions edge_functions(const PreparedRay& ray, const float (&corners)[3][3]) {
     EdgeFunctions edges;
-    double x[3], y[3], largest = 0.0;
+    double x[3], y[3], farthest = 0.0, largest = 0.0;
     for (int corner = 0; corner < 3; ++corner) {
-        const float* position = corners[corner];
-        const double z = double(position[ray.kz]) - double(ray.origin[ray.kz]);
-        x[corner] = double(position[ray.kx]) - double(ray.origin[ray.kx]) - ray.shear_xd * z;
-        y[corner] = double(position[ray.ky]) - double(ray.origin[ray.ky]) - ray.shear_yd * z;
+        const double along_x = double(corners[corner][ray.kx]) - double(ray.origin[ray.kx]);
+        const double along_y = double(corners[corner][ray.ky]) - double(ray.origin[ray.ky]);
+        const double z = double(corners[corner][ray.kz]) - double(ray.origin[ray.kz]);
+        x[corner] = along_x - ray.shear_xd * z;
+        y[corner] = along_y - ray.shear_yd * z;
         edges.z[corner] = z;
+        farthest = std::max({farthest, std::abs(along_x), std::abs(along_y), std::abs(z)});
         largest = std::max({largest, std::abs(x[corner]), std::abs(y[corner])});
     }
     edges.a = x[2] * y[1] - y[2] * x[1];
     edges.b = x[0] * y[2] - y[0] * x[2];
     edges.c = x[1] * y[0] - y[1] * x[0];
 
-    // The error bound of the float filter (traverse.cpp), with 2^-53 for 2^-24.
-    const double error = double(ray.projection_error) * 0x1p-29;
+    // The error bound of the float filter (traverse.cpp), with 2^-53 for 2^-24 and this triangle's
+    // farthest coordinate for the scene's.
+    const double error = 0x1p-50 * farthest;
     const double bound = (4.0 * error + 0x1p-50 * largest) * largest + 2.0 * error * error;
     const auto decide = [&](double& value, int from, int to) {
         if (std::abs(value) <= bound) value = exact_edge_function(ray, corners[from], corners[to]);

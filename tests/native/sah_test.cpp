@@ -2,6 +2,7 @@
 #include "build/sah.h"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -195,6 +196,7 @@ TEST(Sah, NumbersNodesDepthFirst) {
 }
 
 TEST(Sah, IsTheSameForAnyThreadCount) {
+    const tbb::global_control more_than_cores(tbb::global_control::max_allowed_parallelism, 8);
     for (const Mesh& mesh : {random_soup(30000), grid(120)}) {
         const BinaryBvh one = with_threads(1, [&] { return build(mesh); });
         const BinaryBvh many = with_threads(7, [&] { return build(mesh); });

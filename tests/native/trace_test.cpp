@@ -50,7 +50,7 @@ Rays random_rays(std::size_t count, const Box& bounds, std::uint32_t seed) {
 Rays awkward_rays(const Mesh& mesh) {
     const float parts[] = {0.0F, -0.0F, 1.0F, -1.0F, 1e-42F, -1e-30F, 1e20F};
     Rays rays;
-    for (std::size_t i = 0; i < mesh.size() && i < 8; ++i)
+    for (std::size_t i = 0; i < mesh.size() && i < 4; ++i)
         for (const float x : parts)
             for (const float y : parts)
                 for (const float z : parts)
