@@ -9,10 +9,10 @@
 #include <thread>
 #include <vector>
 
+#include "base/exact_sum.h"
 #include "base/parallel.h"
 #include "meshes.h"
 #include "reference/exact_hit.h"
-#include "base/exact_sum.h"
 
 namespace bvhlab {
 namespace {
