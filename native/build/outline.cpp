@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Compiled once per instruction set by Highway; the best one for the processor is taken at run
-// time.
+// Compiled once per instruction set; the best for the processor is taken at run time.
 #include "build/outline.h"
 
-#include <hwy/base.h>
 // No processor lacks SSE4 but has SSSE3, and 512 bits do not help loops of a few bins.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3 | HWY_AVX3_DL)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "build/outline.cpp"
 #include <hwy/foreach_target.h>
-// foreach_target.h comes first.
+// After foreach_target.h, which includes this file again for each target.
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();

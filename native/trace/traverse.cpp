@@ -11,11 +11,7 @@
 #include "trace/trace.h"
 
 // SSE2, SSE4, AVX2 and AVX-512 differ for this code; the targets between them do not.
-#ifdef HWY_AVX3_ZEN4
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_AVX3_ZEN4)
-#else  // Highway 1.0
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
-#endif
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "trace/traverse.cpp"
 #include <hwy/foreach_target.h>
