@@ -32,10 +32,11 @@ namespace bvhlab {
 /// contains the triangle, at a distance not beyond the hit's: no tree can miss or cull it, and
 /// which triangle is closest (ties: the lower index) is the same for all trees. Where a triangle
 /// was split, its parts' boxes are padded so that the argument holds for one of them
-/// (build/sbvh.h).
+/// (build/clip.h).
 ///
 /// Directions are scaled by a power of two so that the longest component is in [1, 2); t is scaled
-/// with them, both exactly. That keeps very long and very short directions away from overflow.
+/// with them. Both are exact but for components 2^-126 of the longest and less, which may lose bits
+/// or vanish. That keeps very long and very short directions away from overflow.
 struct PreparedRay {
     glm::vec3 origin;
     glm::vec3 direction;  ///< scaled
