@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <exception>
+#include <limits>
 
 namespace bvhlab {
 
@@ -26,16 +27,22 @@ public:
     void begin(const char* stage) {
         stage_.store(stage, std::memory_order_relaxed);
         fraction_.store(0.0F, std::memory_order_relaxed);
+        cost_.store(no_cost, std::memory_order_relaxed);
     }
 
     /// Sets the finished share of the stage, in [0, 1].
     void advance(float fraction) { fraction_.store(fraction, std::memory_order_relaxed); }
+
+    /// Sets the cost of the tree as it stands, for stages that improve one (Eq. 2, one reference
+    /// per leaf).
+    void report_cost(double cost) { cost_.store(cost, std::memory_order_relaxed); }
 
     void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
     bool cancelled() const {
         return cancelled_.load(std::memory_order_relaxed) || (whole_ && whole_->cancelled());
     }
     float fraction() const { return fraction_.load(std::memory_order_relaxed); }
+    double cost() const { return cost_.load(std::memory_order_relaxed); }  ///< NaN where none is
     const char* stage() const { return stage_.load(std::memory_order_relaxed); }
 
     /// Throws Cancelled once cancel() was called.
@@ -44,9 +51,12 @@ public:
     }
 
 private:
+    static constexpr double no_cost = std::numeric_limits<double>::quiet_NaN();
+
     const Token* whole_ = nullptr;
     std::atomic<bool> cancelled_{false};
     std::atomic<float> fraction_{0.0F};
+    std::atomic<double> cost_{no_cost};
     std::atomic<const char*> stage_{""};
 };
 

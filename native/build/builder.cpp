@@ -17,20 +17,19 @@ const BuilderInfo all_builders[] = {
      "LBVH",
      "Karras 2012, 60-bit Morton codes",
      {},
-     [](const Mesh& mesh, const CostModel&, const Parameters&, Token& token) {
+     [](const Mesh& mesh, const CostModel&, const Parameters&, Token& token, BuildLog&) {
          return build_lbvh(mesh, token);
      }},
     {"sah",
      "SAH",
      "full sweep, top-down; Wald 2007",
      {},
-     [](const Mesh& mesh, const CostModel& model, const Parameters&, Token& token) {
+     [](const Mesh& mesh, const CostModel& model, const Parameters&, Token& token, BuildLog&) {
          return build_sah(mesh, model, token);
      }},
     {"sbvh", "SBVH", "spatial splits; Stich, Friedrich, Dietrich 2009", sbvh_parameters,
-     [](const Mesh& mesh, const CostModel& model, const Parameters& given, Token& token) {
-         return build_sbvh(mesh, model, sbvh_config(given), token);
-     }},
+     [](const Mesh& mesh, const CostModel& model, const Parameters& given, Token& token,
+        BuildLog&) { return build_sbvh(mesh, model, sbvh_config(given), token); }},
 };
 
 std::string number_text(double value) {

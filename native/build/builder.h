@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/token.h"
+#include "build/build_log.h"
 #include "bvh/binary_bvh.h"
 #include "bvh/cost.h"
 #include "scene/mesh.h"
@@ -33,7 +34,7 @@ struct BuilderInfo {
     std::string_view label;   ///< as in the paper
     std::string_view source;  ///< the publication it implements
     std::span<const ParameterInfo> parameters;
-    BinaryBvh (*build)(const Mesh&, const CostModel&, const Parameters&, Token&);
+    BinaryBvh (*build)(const Mesh&, const CostModel&, const Parameters&, Token&, BuildLog&);
 };
 
 /// All builders, in the paper's order.

@@ -5,6 +5,7 @@
 
 namespace bvhlab {
 
+struct BinaryBvh;
 struct Bvh;
 
 /// Constants of the surface area heuristic (paper section 2.1 and 4: c_T = 3, c_I = 2). One struct
@@ -22,5 +23,8 @@ inline std::size_t charged_tests(std::size_t size, unsigned branching) {
 
 /// Eq. 2 (k = 2) or Eq. 3 (k = 4, 8) of the whole tree, the root included, summed in double.
 double cost(const Bvh& bvh, const CostModel& model);
+
+/// Eq. 2 of a tree with one reference per leaf, summed in double. The same for any thread count.
+double cost(const BinaryBvh& bvh, const CostModel& model);
 
 }  // namespace bvhlab

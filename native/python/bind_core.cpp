@@ -92,7 +92,8 @@ std::shared_ptr<PyBvh> build(const std::shared_ptr<Mesh>& mesh, const std::strin
     with_threads(threads, [&] {
         result->threads = thread_count(0);
         const Stopwatch tree_watch;
-        const BinaryBvh binary = builder.build(*mesh, model, parameters, *token);
+        BuildLog log;
+        const BinaryBvh binary = builder.build(*mesh, model, parameters, *token, log);
         result->tree_seconds = tree_watch.seconds();
         const Stopwatch collapse_watch;
         result->bvh = collapse(binary, mesh, branching, model, *token);

@@ -34,11 +34,13 @@ namespace bvhlab {
 /// was split, its parts' boxes are padded so that the argument holds for one of them
 /// (build/clip.h).
 ///
-/// Directions are scaled by a power of two so that the longest component is in [1, 2); t is scaled
-/// with them. Both are exact but for components 2^-126 of the longest and less, which may lose bits
-/// or vanish. That keeps very long and very short directions away from overflow.
+/// For boxes and distances, directions are scaled by a power of two so that the longest component
+/// is in [1, 2); t is scaled with them. That keeps very long and very short directions away from
+/// overflow. Components 2^-126 of the longest and less may lose bits or vanish there; the exact
+/// decision is taken on the direction as given.
 struct PreparedRay {
     glm::vec3 origin;
+    glm::vec3 given_direction;
     glm::vec3 direction;  ///< scaled
     float t_min, t_max;   ///< scaled
     double unscale;       ///< the caller's t = scaled t * unscale
@@ -65,7 +67,8 @@ inline int exponent_of(double value) {
     return int(std::bit_cast<std::uint64_t>(value) >> 52) - 1023;
 }
 
-inline PreparedRay::PreparedRay(const Ray& ray, const Box& bounds) : origin(ray.origin) {
+inline PreparedRay::PreparedRay(const Ray& ray, const Box& bounds)
+    : origin(ray.origin), given_direction(ray.direction) {
     constexpr float u = 0x1p-24F;
 
     // Scale by a power of two.
@@ -116,15 +119,16 @@ inline PreparedRay::PreparedRay(const Ray& ray, const Box& bounds) : origin(ray.
     kx = (kz + 1) % 3;
     ky = (kz + 2) % 3;
     shear_zd = 1.0 / double(direction[kz]);
-    shear_xd = double(direction[kx]) * shear_zd;
-    shear_yd = double(direction[ky]) * shear_zd;
+    shear_xd = double(given_direction[kx]) / double(given_direction[kz]);
+    shear_yd = double(given_direction[ky]) / double(given_direction[kz]);
     shear_x = float(shear_xd);
     shear_y = float(shear_yd);
     projection_error = 8.0F * u * reach;
 }
 
 /// The edge function of the edge between two corners without rounding errors, for the rare case
-/// that double cannot tell its sign: det(direction, from - origin, to - origin) / direction[kz].
+/// that double cannot tell its sign: det(d, from - origin, to - origin) / d[kz], d =
+/// given_direction.
 double exact_edge_function(const PreparedRay& ray, const float (&from)[3], const float (&to)[3]);
 
 /// Computed interval [near, far] in which the ray is inside a box; `planes` by row of

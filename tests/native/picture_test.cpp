@@ -24,7 +24,8 @@ Bvh tree_of(const std::shared_ptr<const Mesh>& mesh, std::string_view builder = 
             unsigned branching = 8) {
     Token token;
     const BuilderInfo& info = find_builder(builder);
-    const BinaryBvh binary = info.build(*mesh, {}, check_parameters(info, {}), token);
+    BuildLog log;
+    const BinaryBvh binary = info.build(*mesh, {}, check_parameters(info, {}), token, log);
     return collapse(binary, mesh, branching, {}, token);
 }
 

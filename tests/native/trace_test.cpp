@@ -158,6 +158,18 @@ TEST(Trace, TiesGoToTheLowerTriangle) {
     EXPECT_EQ(hits.t[0], 1.0F);
 }
 
+TEST(Trace, DecidesOnTheDirectionAsGiven) {
+    // The ray runs in the triangle's plane along one edge. Scaled, its y component would vanish and
+    // it would no longer.
+    Token token;
+    const glm::vec3 far_corner(1.0F, 1e-30F, 1e18F);
+    const auto mesh = shared(Mesh({{0, 0, 0}, {0, 0, 1}, far_corner}, {{0, 1, 2}}));
+    const Bvh bvh = collapse(build_lbvh(*mesh, token), mesh, 2, {}, token);
+    Rays rays;
+    rays.add({0, 0, 0}, far_corner);
+    EXPECT_EQ(trace(bvh, rays.batch(), {}, token).occluded[0], 0);
+}
+
 TEST(Trace, KeepsToTheInterval) {
     Token token;
     const auto mesh = shared(copies(1));
