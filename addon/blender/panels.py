@@ -57,16 +57,16 @@ class BVHLAB_PT_compare(RenderPanel, bpy.types.Panel):
 def _draw_switches(
     layout: bpy.types.UILayout, label: str, settings: bpy.types.PropertyGroup, names: Sequence[str]
 ) -> None:
-    """A row of switches behind a label, which a click toggles one by one."""
+    """Switches behind a label, three to a row, which a click toggles one by one."""
     split = layout.split(factor=0.4)
     split.use_property_split = False
     heading = split.row()
     heading.alignment = "RIGHT"
     heading.label(text=label)
-    row = split.row(align=True)
+    grid = split.grid_flow(row_major=True, columns=3, even_columns=True, align=True)
     for name in names:
         if hasattr(settings, name):
-            row.prop(settings, name, toggle=True)
+            grid.prop(settings, name, toggle=True)
 
 
 def _draw_start(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -119,6 +119,8 @@ class BVHLAB_PT_settings(RenderPanel, bpy.types.Panel):
             sizes.prop(settings, "resolution")
             sizes.prop(settings, "samples")
             sizes.prop(settings, "views")
+            if settings.use_prbvh_a or settings.use_prbvh_sa:
+                sizes.prop(settings, "annealing")
         checks = layout.column(align=True)
         checks.prop(settings, "repeats")
         checks.prop(settings, "judged_rays")

@@ -17,7 +17,7 @@ from bpy.props import (
 )
 
 from ..native import load
-from ..study.plan import BRANCHINGS, Plan
+from ..study.plan import BRANCHINGS, QUICK_ITERATIONS, Plan
 from . import preferences, store
 
 QUICK = Plan()
@@ -56,6 +56,41 @@ class BVHLAB_PG_settings(bpy.types.PropertyGroup):
         description="Linear BVH: sorts the triangles along a curve. The fastest to build",
         default=True,
     )
+    use_hlbvh: BoolProperty(
+        name="HLBVH",
+        description="LBVH below, the surface area heuristic at the top. Fast to build",
+        default=True,
+    )
+    use_ploc: BoolProperty(
+        name="PLOC",
+        description="Merges nearest neighbours, bottom-up. Fast to build, good to trace",
+        default=True,
+    )
+    use_atrbvh: BoolProperty(
+        name="ATRBVH",
+        description="LBVH, improved piece by piece: treelets of 20 leaves are built anew",
+        default=True,
+    )
+    use_prbvh: BoolProperty(
+        name="PRBVH",
+        description="LBVH, improved by moving subtrees to better places until none is found",
+        default=True,
+    )
+    use_prbvh_a: BoolProperty(
+        name="PRBVHᴬ",
+        description="PRBVH with simulated annealing: takes minutes, gains about a percent",
+        default=False,
+    )
+    use_prbvh_s: BoolProperty(
+        name="PRBVHₛ",
+        description="SBVH, improved by moving subtrees. Slow to build, the fastest to trace",
+        default=True,
+    )
+    use_prbvh_sa: BoolProperty(
+        name="PRBVHₛᴬ",
+        description="PRBVHₛ with simulated annealing: takes minutes",
+        default=False,
+    )
     use_sah: BoolProperty(
         name="SAH",
         description="Full sweep of the surface area heuristic: slow to build, fast to trace",
@@ -63,7 +98,12 @@ class BVHLAB_PG_settings(bpy.types.PropertyGroup):
     )
     use_sbvh: BoolProperty(
         name="SBVH",
-        description="SAH with spatial splits, which cut long triangles. The slowest to build",
+        description="SAH with spatial splits, which cut long triangles. Slow to build",
+        default=True,
+    )
+    use_trbvh: BoolProperty(
+        name="TRBVH",
+        description="LBVH, improved piece by piece: treelets of 7 leaves are built the best way",
         default=True,
     )
     use_2: BoolProperty(name="2", description="Binary: two children a node", default=True)
@@ -112,6 +152,14 @@ class BVHLAB_PG_settings(bpy.types.PropertyGroup):
         min=1,
         soft_max=64,
         max=4096,
+    )
+    annealing: IntProperty(
+        name="Annealing",
+        description="Iterations of simulated annealing, for PRBVHᴬ and PRBVHₛᴬ",
+        default=QUICK_ITERATIONS,
+        min=1,
+        soft_max=3000,
+        max=1_000_000,
     )
     views: IntProperty(
         name="Views",
@@ -164,6 +212,8 @@ class BVHLAB_PG_settings(bpy.types.PropertyGroup):
         plan.threads = preferences.threads()
         if self.preset == "quick":
             plan.long_side, plan.samples, plan.views = self.resolution, self.samples, self.views
+            for params in plan.params.values():
+                params["iterations"] = self.annealing
         plan.repeats, plan.judged_rays = self.repeats, self.judged_rays
         plan.embree, plan.pictures = self.embree, self.pictures
         return plan

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any
@@ -101,26 +102,33 @@ EMBREE_MODES = (EmbreeMode("high", True), EmbreeMode("high", False))
 
 @dataclass
 class TreeJob:
-    """One tree to build; it fills a row with and, if the plan says so, one without reordering."""
+    """One binary tree to build, and the rows it fills by branching factor.
+
+    Several rows share a branching factor where the plan wants rays in order and reordered.
+    """
 
     builder: str
-    branching: int
     device: str
-    rows: list[Row] = field(default_factory=list)
+    rows: dict[int, list[Row]] = field(default_factory=dict)
 
     @property
-    def stage(self) -> str:
-        """The job in words."""
-        return f"building {self.rows[0].label} {self.branching}-wide"
+    def label(self) -> str:
+        """The builder's name in the paper's spelling."""
+        return self.all_rows()[0].label
+
+    def all_rows(self) -> list[Row]:
+        """The rows of all branching factors."""
+        return [row for rows in self.rows.values() for row in rows]
 
 
 def tree_jobs(core: ModuleType, plan: Plan) -> list[TreeJob]:
-    """The trees that the plan's variants need, each once."""
+    """The binary trees that the plan's variants need, each once."""
     labels = {builder["id"]: builder["label"] for builder in core.builders()}
-    jobs: dict[tuple[str, int, str], TreeJob] = {}
+    jobs: dict[tuple[str, str], TreeJob] = {}
     for variant in plan.variants():
-        key = (variant.builder, variant.branching, variant.device)
-        jobs.setdefault(key, TreeJob(*key)).rows.append(_row(variant, labels[variant.builder]))
+        key = (variant.builder, variant.device)
+        rows = jobs.setdefault(key, TreeJob(*key)).rows
+        rows.setdefault(variant.branching, []).append(_row(variant, labels[variant.builder]))
     return list(jobs.values())
 
 
@@ -136,12 +144,12 @@ def _row(variant: Variant, label: str) -> Row:
     )
 
 
-def record_build(job: TreeJob, bvh: Any, plan: Plan) -> None:
-    """Add one build's seconds, and what the tree is, to the job's rows."""
+def record_build(rows: Sequence[Row], bvh: Any, plan: Plan) -> None:
+    """Add one build's seconds, and what the tree is, to the rows that trace it."""
     stats = bvh.stats
     names = [name for name in Tree.__dataclass_fields__ if name != "cost"]
     tree = Tree(**{n: stats[n] for n in names}, cost=bvh.cost(plan.traversal, plan.intersection))
-    for row in job.rows:
+    for row in rows:
         row.tree, row.threads = tree, stats["threads"]
         row.build_seconds.append(stats["build_seconds"])
         row.tree_seconds.append(stats["tree_seconds"])

@@ -116,7 +116,10 @@ class Picture:
 
 @dataclass
 class Tree:
-    """The size of a tree, in the words of `Bvh.stats`; ``cost`` is Eq. 2 (binary) or 3 (wide)."""
+    """The size of a tree, in the words of `Bvh.stats`; ``cost`` is Eq. 2 (binary) or 3 (wide).
+
+    ``iterations`` and why they ``ended`` are 0 and "" for builders that do not iterate.
+    """
 
     nodes: int
     interior_nodes: int
@@ -127,6 +130,8 @@ class Tree:
     average_leaf_size: float
     bytes: int
     cost: float
+    iterations: int = 0
+    ended: str = ""
 
 
 @dataclass

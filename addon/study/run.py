@@ -43,6 +43,8 @@ from .scene import Float32Array, Scene
 
 __all__ = ["Event", "RowChanged", "Step", "Study", "compare"]
 
+SLOW_BUILD_SECONDS = 10.0  # a tree that takes longer is built and timed once
+
 
 @dataclass
 class Study:
@@ -90,8 +92,9 @@ class _Runner:
         self.jobs = tree_jobs(core, plan)
         self.modes = EMBREE_MODES if plan.embree else ()
         self.group = 1
+        self.slow_builds: list[str] = []
         self.guess = Estimate(plan, len(scene.triangles), self.views)
-        rows = [row for job in self.jobs for row in job.rows]
+        rows = [row for job in self.jobs for row in job.all_rows()]
         rows += [embree_row(core, mode, plan) for mode in self.modes]
         builds = [job.builder for job in self.jobs] + ["embree"] * len(self.modes)
         self.progress = Progress(self.guess.planned(rows, builds), emit)
@@ -139,28 +142,48 @@ class _Runner:
             yield lambda mode=mode: self._build_embree(mode)  # type: ignore[misc]
 
     def _build_tree(self, job: TreeJob) -> list[Contender]:
-        plan, bvh = self.plan, None
-        self._enter(job.rows)
-        with self._failing_alone(job.rows):
-            for _ in range(plan.build_repeats):
-                bvh = None  # two trees of the largest scenes need not fit
+        rows = job.all_rows()
+        bvhs: dict[int, Any] = {}
+        self._enter(rows)
+        with self._failing_alone(rows):
+            for repeat in range(self.plan.build_repeats):
+                bvhs = {}  # two trees of the largest scenes need not fit
                 guess = self.guess.build(job.builder)
-                with self.progress.step(f"build {job.builder}", guess, job.stage):
-                    bvh = self.core.build(
-                        self.mesh,
-                        job.builder,
-                        branching=job.branching,
-                        device=job.device,
-                        threads=plan.threads,
-                        params=plan.params.get(job.builder, {}),
-                        traversal=plan.traversal,
-                        intersection=plan.intersection,
-                        token=self.token,
-                    )
-                record_build(job, bvh, plan)
-            assert bvh is not None
-            bvh.validate()
-        return self._started([OurTree(self.core, row, bvh, plan) for row in job.rows])
+                with self.progress.step(f"build {job.builder}", guess, f"building {job.label}"):
+                    bvhs = self._build_once(job)
+                left = self.plan.build_repeats - 1 - repeat
+                if left and rows[0].tree_seconds[0] > SLOW_BUILD_SECONDS:
+                    self.progress.skip({f"build {job.builder}": left * guess})
+                    self.slow_builds.append(job.label)
+                    break
+            for bvh in bvhs.values():
+                bvh.validate()
+        return self._started(
+            [
+                OurTree(self.core, row, bvhs.get(branching), self.plan)
+                for branching, of_branching in job.rows.items()
+                for row in of_branching
+            ]
+        )
+
+    def _build_once(self, job: TreeJob) -> dict[int, Any]:
+        """One timed build: the binary tree, and from it the tree of each branching factor."""
+        plan = self.plan
+        tree = self.core.build_tree(
+            self.mesh,
+            job.builder,
+            device=job.device,
+            threads=plan.threads,
+            params=plan.params.get(job.builder, {}),
+            traversal=plan.traversal,
+            intersection=plan.intersection,
+            token=self.token,
+        )
+        bvhs = {}
+        for branching, rows in job.rows.items():
+            bvhs[branching] = tree.collapse(branching, token=self.token)
+            record_build(rows, bvhs[branching], plan)
+        return bvhs
 
     def _build_embree(self, mode: EmbreeMode) -> list[Contender]:
         row, scene = embree_row(self.core, mode, self.plan), None
@@ -343,6 +366,12 @@ class _Runner:
 
     def _note_what_is_missing(self) -> None:
         notes, plan = self.result.notes, self.plan
+        notes += _iteration_notes(self.result.rows)
+        if self.slow_builds:
+            notes.append(
+                f"Built and timed once, for it took more than {SLOW_BUILD_SECONDS:g} s: "
+                f"{', '.join(self.slow_builds)}."
+            )
         if plan.width:
             notes.append(
                 f"Pictures are {plan.width}x{plan.height} whatever the cameras' shape: each keeps "
@@ -358,6 +387,16 @@ class _Runner:
             if self.result.reference and not self.result.cancelled and missing:
                 kinds = " and ".join(sorted(missing))
                 notes.append(f"View {view.name} has no {kinds} rays: no primary ray hit anything.")
+
+
+def _iteration_notes(rows: Sequence[Row]) -> list[str]:
+    """How the builders that work in iterations ended, a sentence each."""
+    ends = {
+        row.label: f"{row.label}: {row.tree.iterations} iterations, then {row.tree.ended}."
+        for row in rows
+        if row.tree and row.tree.ended
+    }
+    return list(ends.values())
 
 
 def _subject(scene: Scene, views: Sequence[View]) -> Subject:

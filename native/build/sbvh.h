@@ -30,8 +30,9 @@ inline constexpr std::array<ParameterInfo, 5> sbvh_parameters{{
      "spatial splits end at nodes of at most this size that are cheapest as a leaf; "
      "1 splits on down to single references",
      "Aila and Laine 2009, released builder"},
-    {"max_references", SbvhConfig{}.max_references, 1.0, 64.0, false, "references per triangle",
-     "limit on duplicates, which bounds the memory; subtrees share it by their size",
+    {"max_references", SbvhConfig{}.max_references, 1.0, 0x1p31, false, "references per triangle",
+     "limit on duplicates, which bounds the memory; subtrees share it by their size; "
+     "1: no duplicates, 2^31: no limit",
      "ours; the paper has no limit"},
 }};
 

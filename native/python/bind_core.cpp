@@ -1,14 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Token, Mesh, build, Bvh, trace, builders, devices.
+// Token, Mesh, trace, devices, features.
 #include <pybind11/stl.h>
 
-#include <stdexcept>
-
 #include "base/parallel.h"
-#include "build/builder.h"
-#include "bvh/collapse.h"
-#include "bvh/cost.h"
-#include "bvh/validate.h"
 #include "python/convert.h"
 #include "trace/trace.h"
 
@@ -16,10 +10,6 @@ namespace bvhlab {
 namespace {
 
 // --- arguments -----------------------------------------------------------------------------------
-
-void check_device(const std::string& device) {
-    if (device != "cpu") throw py::value_error("unknown device '" + device + "'; there is cpu");
-}
 
 /// Triangle indices of any integer dtype as uint32, each in range of uint32.
 Array<glm::uvec3> triangle_rows(const py::handle& argument) {
@@ -56,73 +46,7 @@ std::shared_ptr<Mesh> mesh_from_python(const py::handle& vertices, const py::han
     return std::make_shared<Mesh>(make_mesh(std::move(positions), std::move(indices)));
 }
 
-Parameters parameters_from_python(const py::dict& given) {
-    Parameters parameters;
-    for (const auto& [name, value] : given) {
-        if (!py::isinstance<py::str>(name)) throw py::value_error("params must have text keys");
-        try {
-            parameters[name.cast<std::string>()] = value.cast<double>();
-        } catch (const py::cast_error&) {
-            throw py::value_error("parameter '" + name.cast<std::string>() + "' must be a number");
-        }
-    }
-    return parameters;
-}
-
 // --- calls ---------------------------------------------------------------------------------------
-
-std::shared_ptr<PyBvh> build(const std::shared_ptr<Mesh>& mesh, const std::string& builder_id,
-                             unsigned branching, const std::string& device, int threads,
-                             const py::dict& params, double traversal, double intersection,
-                             const std::shared_ptr<Token>& given_token) {
-    const BuilderInfo& builder = find_builder(builder_id);
-    if (branching != 2 && branching != 4 && branching != 8)
-        throw py::value_error("branching must be 2, 4 or 8, not " + std::to_string(branching));
-    check_device(device);
-    check_threads(threads);
-    if (!(traversal > 0.0 && traversal < 1e6 && intersection > 0.0 && intersection < 1e6))
-        throw py::value_error("traversal and intersection costs must be above 0 and below 1e6");
-    const Parameters parameters = check_parameters(builder, parameters_from_python(params));
-    const CostModel model{traversal, intersection};
-    const auto token = token_or_new(given_token);
-
-    const py::gil_scoped_release release;
-    auto result = std::make_shared<PyBvh>();
-    result->builder = builder_id;
-    with_threads(threads, [&] {
-        result->threads = thread_count(0);
-        const Stopwatch tree_watch;
-        BuildLog log;
-        const BinaryBvh binary = builder.build(*mesh, model, parameters, *token, log);
-        result->tree_seconds = tree_watch.seconds();
-        const Stopwatch collapse_watch;
-        result->bvh = collapse(binary, mesh, branching, model, *token);
-        result->collapse_seconds = collapse_watch.seconds();
-    });
-    return result;
-}
-
-py::dict stats(const PyBvh& self) {
-    const Bvh& bvh = self.bvh;
-    py::dict stats;
-    stats["builder"] = self.builder;
-    stats["branching"] = bvh.branching();
-    stats["nodes"] = bvh.interior_count() + bvh.leaf_count;
-    stats["interior_nodes"] = bvh.interior_count();
-    stats["leaves"] = bvh.leaf_count;
-    stats["references"] = bvh.reference_count;
-    stats["max_depth"] = bvh.max_depth;
-    stats["max_leaf_size"] = bvh.max_leaf_size;
-    stats["average_leaf_size"] = double(bvh.reference_count) / double(bvh.leaf_count);
-    stats["bytes"] = bvh.node_bytes() + bvh.leaf_bytes();
-    stats["node_bytes"] = bvh.node_bytes();
-    stats["leaf_bytes"] = bvh.leaf_bytes();
-    stats["build_seconds"] = self.tree_seconds + self.collapse_seconds;
-    stats["tree_seconds"] = self.tree_seconds;
-    stats["collapse_seconds"] = self.collapse_seconds;
-    stats["threads"] = self.threads;
-    return stats;
-}
 
 PyHits trace_rays(const PyBvh& self, const py::object& origins, const py::object& directions,
                   const py::object& t_min, const py::object& t_max, bool any_hit, bool reorder,
@@ -138,32 +62,6 @@ PyHits trace_rays(const PyBvh& self, const py::object& origins, const py::object
         hits = trace(self.bvh, rays.batch(), {any_hit, reorder, count, threads}, *token);
     }
     return to_python(std::move(hits), any_hit, count);
-}
-
-py::list list_builders() {
-    py::list list;
-    for (const BuilderInfo& builder : builders()) {
-        py::list parameters;
-        for (const ParameterInfo& info : builder.parameters) {
-            py::dict parameter;
-            parameter["name"] = info.name;
-            parameter["default"] = info.default_value;
-            parameter["minimum"] = info.minimum;
-            parameter["maximum"] = info.maximum;
-            parameter["integer"] = info.integer;
-            parameter["unit"] = info.unit;
-            parameter["description"] = info.description;
-            parameter["source"] = info.source;
-            parameters.append(parameter);
-        }
-        py::dict entry;
-        entry["id"] = builder.id;
-        entry["label"] = builder.label;
-        entry["source"] = builder.source;
-        entry["parameters"] = parameters;
-        list.append(entry);
-    }
-    return list;
 }
 
 py::list list_devices() {
@@ -211,6 +109,9 @@ void bind_token(py::module_& module) {
         .def(py::init<>())
         .def("cancel", &Token::cancel, "Makes the call raise Cancelled within 0.1 s.")
         .def_property_readonly("cancelled", &Token::cancelled)
+        .def_property_readonly(
+            "cost", [](const Token& token) { return token.cost(); },
+            "Cost of the tree as it stands, for builders that improve one; NaN where none is.")
         .def_property_readonly("fraction", &Token::fraction, "Finished share of the stage, 0 to 1.")
         .def_property_readonly("stage", &Token::stage);
 }
@@ -249,33 +150,6 @@ void bind_mesh(py::module_& module) {
             "(2, 3) float32: lower and upper corner of all triangles.");
 }
 
-void bind_bvh(py::module_& module) {
-    py::class_<PyBvh, std::shared_ptr<PyBvh>>(module, "Bvh", "A tree ready to be traced.")
-        .def(
-            "cost",
-            [](const PyBvh& self, double traversal, double intersection) {
-                return cost(self.bvh, {traversal, intersection});
-            },
-            py::arg("traversal") = 3.0, py::arg("intersection") = 2.0,
-            "Expected cost of a ray: Eq. 2 of the paper (branching 2) or Eq. 3 (4 and 8).")
-        .def_property_readonly("stats", &stats, "Sizes, counts and build times in seconds.")
-        .def(
-            "validate",
-            [](const PyBvh& self) {
-                const py::gil_scoped_release release;
-                try {
-                    validate(self.bvh);
-                } catch (const std::logic_error& error) {
-                    throw std::runtime_error(error.what());
-                }
-            },
-            "Raises RuntimeError with the first broken invariant.")
-        .def_property_readonly(
-            "mesh", [](const PyBvh& self) { return std::const_pointer_cast<Mesh>(self.bvh.mesh); })
-        .def_property_readonly("builder", [](const PyBvh& self) { return self.builder; })
-        .def_property_readonly("branching", [](const PyBvh& self) { return self.bvh.branching(); });
-}
-
 void bind_hits(py::module_& module) {
     py::class_<PyHits>(
         module, "Hits",
@@ -301,20 +175,12 @@ void bind_hits(py::module_& module) {
 void bind_core(py::module_& module) {
     bind_token(module);
     bind_mesh(module);
-    bind_bvh(module);
     bind_hits(module);
-    module.def(
-        "build", &build, py::arg("mesh"), py::arg("builder"), py::arg("branching") = 8,
-        py::arg("device") = "cpu", py::arg("threads") = 0, py::arg("params") = py::dict(),
-        py::arg("traversal") = 3.0, py::arg("intersection") = 2.0, py::arg("token") = nullptr,
-        "Builds a tree. Raises ValueError for unknown names and values out of range, Cancelled "
-        "after token.cancel().");
     module.def("trace", &trace_rays, py::arg("bvh"), py::arg("origins"), py::arg("directions"),
                py::arg("t_min") = 0.0F, py::arg("t_max") = std::numeric_limits<float>::infinity(),
                py::arg("any_hit") = false, py::arg("reorder") = false, py::arg("device") = "cpu",
                py::arg("threads") = 0, py::arg("count") = false, py::arg("token") = nullptr,
                "Traces rays (N, 3) float32. Raises ValueError naming the first bad ray.");
-    module.def("builders", &list_builders, "The builders there are, with their parameters.");
     module.def("devices", &list_devices,
                "The devices there are; `reason` says why one is left out.");
     module.def("features", &features, "What this build of the core holds.");

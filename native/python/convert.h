@@ -8,6 +8,7 @@
 #include <string>
 
 #include "base/token.h"
+#include "build/build_log.h"
 #include "bvh/wide_bvh.h"
 #include "scene/mesh.h"
 #include "trace/ray.h"
@@ -58,6 +59,7 @@ struct PyBvh {
     std::string builder;
     int threads;
     double tree_seconds, collapse_seconds;
+    BuildLog log;
 };
 
 /// What core.trace, core.brute_force and EmbreeScene.trace return (class `Hits` in Python).
@@ -93,7 +95,12 @@ std::shared_ptr<Token> token_or_new(const std::shared_ptr<Token>& token);
 /// Throws ValueError unless 0 <= threads <= 4096.
 void check_threads(int threads);
 
-void bind_core(py::module_& module);       // Token, Mesh, build, Bvh, trace, builders, devices
+/// Throws ValueError for a device that does not exist.
+void check_device(const std::string& device);
+
+void bind_core(py::module_& module);       // Token, Mesh, trace, devices, features
+void bind_build(py::module_& module);      // builders, build_tree, Tree, build, Bvh
+void bind_metrics(py::module_& module);    // metrics
 void bind_reference(py::module_& module);  // brute_force, embree, EmbreeScene
 void bind_render(py::module_& module);     // Camera, Light, Scene, rays, render
 void bind_image(py::module_& module);      // write_image, image_difference

@@ -108,7 +108,7 @@ def test_help_is_no_error(capsys: pytest.CaptureFixture[str]) -> None:
         ("", "the following arguments are required: compare | builders | devices"),
         ("measure", "invalid choice: 'measure'"),
         ("compare", "compare needs a scene file: .blend, .npz, .obj or .ply"),
-        ("compare MESH --builders nope", "unknown builder 'nope'; there are: lbvh, sah, sbvh"),
+        ("compare MESH --builders nope", "unknown builder 'nope'; there are: lbvh, hlbvh, "),
         ("compare MESH --branching 3", "branching 3 is not known; it is 2, 4 or 8"),
         ("compare MESH --branching two", "--branching: 'two' is not a whole number"),
         ("compare MESH --device gpu", "unknown device 'gpu'; there are: cpu"),
