@@ -11,18 +11,18 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import bpy
 import numpy as np
+from bench_build import bench_builds, ratio_text
 from bvh_lab.native import core
 from bvh_lab.study.load import load_mesh_file
 from bvh_lab.study.machine import describe_machine
-from bvh_lab.study.plan import Plan
+from bvh_lab.study.plan import BUILDERS, QUICK_PARAMS, Plan
 from bvh_lab.study.rays import choose_views, generate_rays
-from bvh_lab.study.results import KINDS, Result, Row, spread
+from bvh_lab.study.results import KINDS, Result, Row
 from bvh_lab.study.run import compare
 from bvh_lab.study.scene import Camera, Scene
 
@@ -67,54 +67,6 @@ def load_scene(path: Path) -> Scene:
             for i, view in enumerate(PAPER_VIEWS[path.stem])
         ]
     return scene
-
-
-def ratio_text(ratios: list[float]) -> str:
-    """Median with quartiles."""
-    low, median, high = spread(ratios)
-    return f"{median:6.2f} [{low:.2f} {high:.2f}]"
-
-
-# --- building ------------------------------------------------------------------------------------
-
-
-def build_contenders(mesh: Any) -> dict[str, Callable[[], float]]:
-    """Name to a function that builds once and gives the seconds."""
-
-    def ours(builder: str) -> Callable[[], float]:
-        return lambda: float(core.build(mesh, builder, branching=8).stats["build_seconds"])
-
-    def embree(quality: str) -> Callable[[], float]:
-        return lambda: float(core.EmbreeScene(mesh, quality=quality, robust=False).build_seconds)
-
-    contenders = {f"Embree {quality}": embree(quality) for quality in ("low", "medium", "high")}
-    contenders |= {entry["label"]: ours(entry["id"]) for entry in core.builders()}
-    return contenders
-
-
-def bench_builds(mesh: Any, repeats: int) -> list[str]:
-    """Lines of the table of build times, as ratios to each of Embree's qualities."""
-    contenders = build_contenders(mesh)
-    seconds: dict[str, list[float]] = {name: [] for name in contenders}
-    for repeat in range(repeats + 1):
-        for name, build in contenders.items():
-            measured = build()
-            if repeat:  # the first round warms up
-                seconds[name].append(measured)
-    lines = [
-        f"Build time, 8-wide (tree, collapse and layout), {repeats} rounds: median [quartiles]",
-        f"{'':14s} {'ms':>9s}  "
-        + " ".join(f"{'/ Embree ' + quality:>20s}" for quality in ("low", "medium", "high")),
-    ]
-    for name, own in seconds.items():
-        ratios = [
-            ratio_text([a / b for a, b in zip(own, seconds[f"Embree {q}"], strict=True)])
-            for q in ("low", "medium", "high")
-        ]
-        lines.append(
-            f"{name:14s} {1e3 * spread(own).median:9.1f}  " + " ".join(f"{r:>20s}" for r in ratios)
-        )
-    return lines
 
 
 # --- tracing -------------------------------------------------------------------------------------
@@ -206,6 +158,8 @@ def bench(path: Path, out: Path, arguments: argparse.Namespace) -> str:
     scene = load_scene(path)
     mesh = core.Mesh(scene.vertices, scene.triangles)
     plan = Plan.from_preset("paper")
+    plan.params |= QUICK_PARAMS  # the full annealing takes half an hour: `make paper`
+    plan.builders = arguments.builders
     plan.width, plan.height = arguments.resolution
     plan.repeats, plan.build_repeats, plan.pictures = arguments.repeats, 1, False
     plan.judged_rays = 256
@@ -217,7 +171,7 @@ def bench(path: Path, out: Path, arguments: argparse.Namespace) -> str:
         f"{machine.cpu}, {machine.cores} cores, {core.devices()[0]['simd']}, "
         f"Embree {machine.embree}, {plan.width}x{plan.height}",
         "",
-        *bench_builds(mesh, 3 if large else arguments.repeats),
+        *bench_builds(path, mesh, plan, 3 if large else arguments.repeats),
         "",
     ]
     print("\n".join(lines), flush=True)
@@ -238,9 +192,11 @@ def main() -> int:
         "scenes", nargs="*", type=Path, help="mesh files; default: crytek_sponza and crown"
     )
     parser.add_argument("--out", type=Path, default=Path("out/bench"))
+    parser.add_argument("--builders", default=",".join(BUILDERS), help="e.g. lbvh,sbvh")
     parser.add_argument("--repeats", type=int, default=7)
     parser.add_argument("--resolution", default="640x480")
     arguments = parser.parse_args()
+    arguments.builders = arguments.builders.split(",")
     arguments.resolution = [int(side) for side in arguments.resolution.split("x")]
     scenes = arguments.scenes or [SHARED / "crytek_sponza.npz", SHARED / "crown.npz"]
     missing = [str(path) for path in scenes if not path.is_file()]

@@ -126,13 +126,15 @@ class _Runner:
     def _measure_everything(self) -> None:
         budget = self.plan.memory_gib * 2**30 or free_bytes() / 2.0
         held: list[Contender] = []
+        sizes: list[int] = []  # of what each build left in `held`, in bytes
         for build in self._builds():
-            largest = max((contender.bytes for contender in held), default=0)
-            if held and sum(contender.bytes for contender in held) + largest > budget:
+            if held and sum(sizes) + max(sizes) > budget:
                 self._measure(held)
-                held = []
+                held, sizes = [], []
                 self.group += 1
-            held += build()
+            built = build()
+            held += built
+            sizes.append(sum(contender.bytes for contender in built))
         self._measure(held)
 
     def _builds(self) -> Iterator[Callable[[], Sequence[Contender]]]:

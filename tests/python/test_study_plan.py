@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from bvh_lab.native import core
 from bvh_lab.study.arguments import add_plan_arguments, plan_from_arguments
-from bvh_lab.study.plan import Plan, Variant
+from bvh_lab.study.plan import BUILDERS, UNLIMITED_REFERENCES, Plan, Variant
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -36,6 +36,16 @@ def test_presets_are_good_plans(preset: str) -> None:
     plan = Plan.from_preset(preset)
     plan.check(core.builders(), core.devices())
     assert plan.preset_note().startswith(f"Preset {preset}")
+
+
+def test_the_default_is_every_builder_of_the_core() -> None:
+    assert list(BUILDERS) == [builder["id"] for builder in core.builders()]
+    assert Plan().builders == list(BUILDERS)
+
+
+def test_presets_do_not_share_their_settings() -> None:
+    Plan().params["prbvh_a"]["iterations"] = 1.0
+    assert Plan().params["prbvh_a"]["iterations"] > 1.0
 
 
 def test_paper_preset_has_the_papers_resolution() -> None:
@@ -130,7 +140,7 @@ def test_arguments_change_the_preset() -> None:
     assert (plan.width, plan.builders, plan.branchings) == (1024, ["sah"], [8, 2])
     assert (plan.views, plan.samples, plan.reorders) == (2, 7, [False, True])
     assert (plan.embree, plan.pictures, plan.threads) == (False, True, 1)
-    assert plan.params == {"sbvh": {"alpha": 1e-4}}
+    assert plan.params["sbvh"] == {"max_references": UNLIMITED_REFERENCES, "alpha": 1e-4}
 
 
 def test_arguments_name_views_and_resolutions() -> None:

@@ -141,7 +141,7 @@ def test_events_tell_progress_and_rows() -> None:
     steps = [event for event in events if isinstance(event, Step)]
     fractions = [step.fraction for step in steps]
     assert fractions == sorted(fractions) and 0.8 < fractions[-1] <= 1.0
-    assert steps[0].stage == "building SAH 2-wide" and all(s.seconds_left >= 0.0 for s in steps)
+    assert steps[0].stage == "building SAH" and all(s.seconds_left >= 0.0 for s in steps)
     finished = [event.row for event in events if isinstance(event, RowChanged) and event.finished]
     assert finished == result.rows
 
@@ -172,19 +172,26 @@ def test_a_view_of_nothing_has_primary_rays_only() -> None:
 def test_trees_that_do_not_fit_are_measured_in_groups() -> None:
     plan = small_plan(memory_gib=1e-9, embree=False)
     result = compare(sample_scene(), plan).result
-    assert [row.group for row in result.rows] == [1, 2, 3, 4]
+    assert [row.group for row in result.rows] == [1, 1, 2, 2]
     assert not result.failed() and all(row.speed("diffuse") for row in result.rows)
-    assert any("measured in 4 groups" in note for note in result.notes)
+    assert any("measured in 2 groups" in note for note in result.notes)
+
+
+def test_slow_builds_are_timed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "SLOW_BUILD_SECONDS", 0.0)
+    result = compare(sample_scene(), small_plan(build_repeats=3, embree=False)).result
+    assert {len(row.build_seconds) for row in result.rows} == {1}
+    assert "Built and timed once, for it took more than 0 s: LBVH, SAH." in result.notes
 
 
 def failing_build(mesh: Any, builder: str, **more: Any) -> Any:
     if builder == "sah":
         raise RuntimeError("the SAH builder broke")
-    return core.build(mesh, builder, **more)
+    return core.build_tree(mesh, builder, **more)
 
 
 def test_a_variant_that_fails_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run, "load", lambda: Double(build=failing_build))
+    monkeypatch.setattr(run, "load", lambda: Double(build_tree=failing_build))
     plan = small_plan(builders=["sah", "lbvh"], embree=False)
     result = compare(sample_scene(), plan).result
     assert [row.error for row in result.rows] == ["the SAH builder broke"] * 2 + [""] * 2
