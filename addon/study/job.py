@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
 import time
@@ -67,8 +68,11 @@ class Job:
 
     @property
     def stage(self) -> str:
-        """What the study does now, as of the last `poll`."""
-        return self._step.stage
+        """What the study does now, as of the last `poll`; how far a tree has been improved."""
+        cost = float(self._token.cost)
+        if math.isnan(cost):
+            return self._step.stage
+        return f"{self._step.stage}: {self._token.fraction:.0%}, cost {cost:.1f}"
 
     @property
     def seconds_left(self) -> float:
