@@ -10,7 +10,7 @@ CPP_FILES = find native tests/native -name '*.h' -o -name '*.cpp'
 export SCENE
 .NOTPARALLEL:
 .PHONY: help setup build compare test lint test-native test-python test-bpy test-blender test-ui \
-	format test-scenes bench zip scenes clean check-scene
+	format test-scenes bench paper zip scenes clean check-scene
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-13s %s\n", $$1, $$2}' Makefile
@@ -63,6 +63,9 @@ format: setup ## format all sources
 
 bench: build ## time builders and tracing against Embree and mathutils.bvhtree into out/bench
 	@$(PYTHON) scripts/bench.py --out out/bench $(ARGS)
+
+paper: check-scene build ## compare costs with the paper's on SCENE=file (.npz, .obj, .ply) into out/paper, with ARGS="--metrics"
+	@$(PYTHON) scripts/paper.py "$$SCENE" --out out/paper $(ARGS)
 
 zip: build ## make the add-on's installable zip in dist/
 	@.venv/bin/python scripts/make_zip.py

@@ -27,6 +27,9 @@ class Job:
         self._events: queue.SimpleQueue[Event] = queue.SimpleQueue()
         self._study: Study | None = None
         self._error: BaseException | None = None
+        # Not Thread.join: a Ctrl-C inside one lets the next return while the thread still runs
+        # (Python 3.11).
+        self._ended = threading.Event()
         self._thread = threading.Thread(
             target=self._work, args=(scene, plan, host), name="bvh_lab study"
         )
@@ -38,15 +41,17 @@ class Job:
             self._study = compare(scene, plan, self._token, self._events.put, host)
         except BaseException as error:  # handed to the caller in `study`
             self._error = error
+        finally:
+            self._ended.set()
 
     @property
     def running(self) -> bool:
         """Whether the worker is still at it."""
-        return self._thread.is_alive()
+        return not self._ended.is_set()
 
     def wait(self, seconds: float) -> None:
         """Wait for the end, but not longer than ``seconds``; signals are still handled."""
-        self._thread.join(seconds)
+        self._ended.wait(seconds)
 
     def cancel(self) -> None:
         """Ask the study to stop; it does within about 0.1 s and keeps the rows measured so far."""
@@ -82,6 +87,7 @@ class Job:
     @property
     def study(self) -> Study:
         """The study, after the end; raises what `compare` raised."""
+        self._ended.wait()
         self._thread.join()
         if self._error is not None:
             raise self._error
