@@ -4,10 +4,10 @@
 #include <tbb/parallel_invoke.h>
 
 #include <bit>
+#include <utility>
 
 #include "base/parallel.h"
-#include "build/morton.h"
-#include "build/radix_sort.h"
+#include "build/morton_order.h"
 
 namespace bvhlab {
 namespace {
@@ -34,60 +34,42 @@ std::uint32_t find_split(const Array<std::uint64_t>& codes, std::uint32_t first,
     return low;
 }
 
-/// Builds the subtrees of Karras' tree, boxes on the way up. A subtree over the references
-/// first..last has its last - first interior nodes at node, node + 1, ... in depth-first order.
-struct SubtreeBuilder {
-    const Array<std::uint64_t>& codes;
-    BinaryBvh& bvh;
-    const Token& token;
-
-    /// Returns the root of the subtree. Recursion is at most 60 + 28 deep.
-    std::uint32_t build(std::uint32_t node, std::uint32_t first, std::uint32_t last) const {
-        if (first == last) return bvh.first_leaf() + first;
-        const std::uint32_t split = find_split(codes, first, last);
-        const std::uint32_t right_node = node + 1 + (split - first);
-        std::uint32_t left, right;
-        if (last - first < smallest_task) {
-            left = build(node + 1, first, split);
-            right = build(right_node, split + 1, last);
-        } else {
-            token.check();
-            tbb::parallel_invoke([&] { left = build(node + 1, first, split); },
-                                 [&] { right = build(right_node, split + 1, last); });
-            // Once another task has thrown, oneTBB leaves nested calls early without an exception.
-            token.check();
-        }
-        bvh.children[node] = {left, right};
-        bvh.boxes[node] = unite(bvh.boxes[left], bvh.boxes[right]);
-        return node;
-    }
-};
-
 }  // namespace
+
+std::uint32_t LbvhSubtrees::build(std::uint32_t node, std::uint32_t first,
+                                  std::uint32_t last) const {
+    if (first == last) return bvh.first_leaf() + first + leaf_shift;
+    const std::uint32_t split = find_split(codes, first, last);
+    const std::uint32_t right_node = node + 1 + (split - first);
+    std::uint32_t left, right;
+    if (last - first < smallest_task) {
+        left = build(node + 1, first, split);
+        right = build(right_node, split + 1, last);
+    } else {
+        token.check();
+        tbb::parallel_invoke([&] { left = build(node + 1, first, split); },
+                             [&] { right = build(right_node, split + 1, last); });
+        // Once another task has thrown, oneTBB leaves nested calls early without an exception.
+        token.check();
+    }
+    bvh.children[node] = {left, right};
+    bvh.boxes[node] = unite(bvh.boxes[left], bvh.boxes[right]);
+    return node;
+}
 
 BinaryBvh build_lbvh(const Mesh& mesh, Token& token) {
     token.begin("building LBVH");
-    const std::size_t count = mesh.size();
-
-    // Sort the triangles along the Morton curve.
-    Array<Box> boxes(count);
-    Array<std::uint64_t> codes(count);
-    BinaryBvh bvh = BinaryBvh::with_references(count);
-    const MortonGrid grid(mesh.bounds);
-    parallel_for_each(count, 4096, token, [&](std::size_t i) {
-        boxes[i] = mesh.box(i);
-        codes[i] = grid.code(boxes[i]);
-        bvh.references[i] = std::uint32_t(i);
-    });
-    token.advance(0.2F);
-    radix_sort(codes, bvh.references, morton_bits, token);
+    MortonOrder order = morton_order(mesh, token);
     token.advance(0.6F);
 
     // Build the tree over the sorted order.
+    const std::size_t count = mesh.size();
+    BinaryBvh bvh = BinaryBvh::with_references(count);
+    bvh.references = std::move(order.references);
     parallel_for_each(count, 4096, token, [&](std::size_t i) {
-        bvh.boxes[bvh.first_leaf() + i] = boxes[bvh.references[i]];
+        bvh.boxes[bvh.first_leaf() + i] = order.boxes[bvh.references[i]];
     });
-    SubtreeBuilder{codes, bvh, token}.build(0, 0, std::uint32_t(count - 1));
+    LbvhSubtrees{order.codes, bvh, token}.build(0, 0, std::uint32_t(count - 1));
     token.advance(1.0F);
     return bvh;
 }
