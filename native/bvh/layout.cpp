@@ -41,13 +41,20 @@ public:
         auto& wide = bvh.tree.template emplace<WideBvh<K>>();
         wide.nodes.resize(opened_.size());
         wide.blocks.resize(end.block);
-        parallel_for_each(opened_.size(), grain, token_, [&](std::size_t i) {
-            fill_node(wide.nodes[i], opened_[i], places_[i], wide.blocks.data());
+        const std::size_t tasks = (opened_.size() + grain - 1) / grain;
+        parallel_for_each(tasks, 1, token_, [&](std::size_t task) {
+            std::vector<std::uint32_t> pending;  // of the leaf at hand
+            for (std::size_t i = task * grain; i < std::min(opened_.size(), (task + 1) * grain);
+                 ++i) {
+                prefetch(i + prefetch_distance);
+                fill_node(wide.nodes[i], opened_[i], places_[i], wide.blocks.data(), pending);
+            }
         });
     }
 
 private:
     static constexpr std::size_t grain = 256;
+    static constexpr std::size_t prefetch_distance = 4;  // nodes
     static constexpr unsigned lanes = block_lanes<K>;
 
     /// Where the children of a wide node go: sums over the nodes before it.
@@ -134,7 +141,7 @@ private:
     }
 
     void fill_node(WideNode<K>& node, const Opened<K>& opened, Place place,
-                   TriangleBlock<lanes>* blocks) const {
+                   TriangleBlock<lanes>* blocks, std::vector<std::uint32_t>& pending) const {
         clear(node);
         for (unsigned c = 0; c < opened.count; ++c) {
             const std::uint32_t child = opened.child[c];
@@ -142,11 +149,24 @@ private:
             if (opened.is_leaf[c]) {
                 node.child[c] = place.block;
                 node.count[c] = size(child);
-                fill_blocks(child, blocks + place.block);
+                fill_blocks(child, blocks + place.block, pending);
                 place.block += (node.count[c] + lanes - 1) / lanes;
             } else {
                 node.child[c] = place.interior++;
             }
+        }
+    }
+
+    /// Asks for what the node will copy: its children lie anywhere in memory.
+    void prefetch(std::size_t i) const {
+        if (i >= opened_.size()) return;
+        for (unsigned c = 0; c < opened_[i].count; ++c) {
+            const std::uint32_t child = opened_[i].child[c];
+            __builtin_prefetch(&binary_.boxes[child]);
+            if (binary_.is_leaf(child))
+                __builtin_prefetch(&mesh_.triangles[binary_.reference(child)]);
+            else
+                __builtin_prefetch(&binary_.children[child]);
         }
     }
 
@@ -159,29 +179,29 @@ private:
     }
 
     /// Copies the triangles below `subtree`, depth-first, into consecutive blocks.
-    void fill_blocks(std::uint32_t subtree, TriangleBlock<lanes>* blocks) const {
+    void fill_blocks(std::uint32_t subtree, TriangleBlock<lanes>* blocks,
+                     std::vector<std::uint32_t>& pending) const {
         std::uint32_t filled = 0;
-        std::uint32_t last = no_triangle;
-        std::vector<std::uint32_t> pending;  // only larger leaves need it
+        Triangle triangle;
         for (std::uint32_t node = subtree;;) {
             while (!binary_.is_leaf(node)) {
                 pending.push_back(binary_.children[node].right);
                 node = binary_.children[node].left;
             }
-            last = binary_.reference(node);
-            set_lane(blocks[filled / lanes], filled % lanes, last, last);
+            const std::uint32_t index = binary_.reference(node);
+            triangle = mesh_.triangle(index);
+            set_lane(blocks[filled / lanes], filled % lanes, triangle, index);
             ++filled;
             if (pending.empty()) break;
             node = pending.back();
             pending.pop_back();
         }
         for (; filled % lanes != 0; ++filled)
-            set_lane(blocks[filled / lanes], filled % lanes, last, no_triangle);
+            set_lane(blocks[filled / lanes], filled % lanes, triangle, no_triangle);
     }
 
-    void set_lane(TriangleBlock<lanes>& block, unsigned lane, std::uint32_t corners_of,
-                  std::uint32_t index) const {
-        const Triangle triangle = mesh_.triangle(corners_of);
+    static void set_lane(TriangleBlock<lanes>& block, unsigned lane, const Triangle& triangle,
+                         std::uint32_t index) {
         const glm::vec3* corners[3] = {&triangle.a, &triangle.b, &triangle.c};
         for (int corner = 0; corner < 3; ++corner)
             for (int axis = 0; axis < 3; ++axis)
