@@ -106,6 +106,11 @@ class BVHLAB_PG_settings(bpy.types.PropertyGroup):
         description="LBVH, improved piece by piece: treelets of 7 leaves are built the best way",
         default=True,
     )
+    use_hybrid: BoolProperty(
+        name="Hybrid",
+        description="SBVH, improved where it matters: about as good as PRBVHₛ, sooner built",
+        default=True,
+    )
     use_2: BoolProperty(name="2", description="Binary: two children a node", default=True)
     use_4: BoolProperty(name="4", description="Four children a node", default=True)
     use_8: BoolProperty(name="8", description="Eight children a node", default=True)

@@ -27,6 +27,7 @@ BUILD_SECONDS_PER_MILLION = {
     "sah": 3.0,
     "sbvh": 9.0,
     "trbvh": 2.5,
+    "hybrid": 15.0,
     "embree": 1.5,
 }
 TRACE_SECONDS_PER_MILLION = 0.5

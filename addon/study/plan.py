@@ -28,6 +28,7 @@ BUILDERS = (
     "sah",
     "sbvh",
     "trbvh",
+    "hybrid",
 )
 
 # Where the presets differ from the builders' defaults. Annealing: the paper runs 3000 iterations.
@@ -35,7 +36,7 @@ QUICK_ITERATIONS = 200
 UNLIMITED_REFERENCES = 2.0**31
 QUICK_PARAMS = {name: {"iterations": float(QUICK_ITERATIONS)} for name in ("prbvh_a", "prbvh_sa")}
 PAPER_PARAMS = {
-    name: {"max_references": UNLIMITED_REFERENCES} for name in ("sbvh", "prbvh_s", "prbvh_sa")
+    name: {"max_references": UNLIMITED_REFERENCES} for name in ("sbvh", "prbvh_s", "prbvh_sa", "hybrid")
 }
 
 

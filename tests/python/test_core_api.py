@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builder_params import fast_params
+from builder_params import ANNEALING, fast_params
 from bvh_lab.native import core
 from bvh_lab.study.plan import BUILDERS
 from hypothesis import given, settings
@@ -170,14 +170,17 @@ def test_iterations_are_logged_and_limited(builder: str) -> None:
     log = core.build_tree(mesh, builder, params={"iterations": 2}).log
     assert log["ended"] in ("iteration limit", "converged")
     iterations, seconds, costs = zip(*log["steps"], strict=True)
-    assert iterations == tuple(range(len(iterations))) and len(iterations) <= 3
+    assert iterations[0] == 0 and sorted(set(iterations)) == list(iterations)
+    if builder not in ANNEALING:  # they end by hill climbing until it converges
+        assert len(iterations) <= 3
     assert list(seconds) == sorted(seconds)
-    assert list(costs) == sorted(costs, reverse=True), "the cost of the best tree never rises"
+    if builder != "trbvh":  # it minimises the cost after the collapse, which this is not
+        assert list(costs) == sorted(costs, reverse=True), "the cost of the best tree never rises"
     token = core.Token()
     tree = core.build_tree(mesh, builder, params={"max_seconds": 1e-6}, token=token)
     assert tree.log["ended"] == "time limit"
     tree.collapse(8).validate()
-    assert token.cost >= tree.cost()
+    assert token.cost == tree.log["steps"][-1][2]
 
 
 @pytest.mark.parametrize("builder", [entry["id"] for entry in core.builders()])
