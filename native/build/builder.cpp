@@ -5,9 +5,16 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "build/atrbvh.h"
+#include "build/hlbvh.h"
+#include "build/hybrid.h"
 #include "build/lbvh.h"
+#include "build/ploc.h"
+#include "build/prbvh.h"
+#include "build/prbvh_a.h"
 #include "build/sah.h"
 #include "build/sbvh.h"
+#include "build/trbvh.h"
 
 namespace bvhlab {
 namespace {
@@ -20,6 +27,41 @@ const BuilderInfo all_builders[] = {
      [](const Mesh& mesh, const CostModel&, const Parameters&, Token& token, BuildLog&) {
          return build_lbvh(mesh, token);
      }},
+    {"hlbvh", "HLBVH", "binned SAH above LBVH clusters; Pantaleoni and Luebke 2010",
+     hlbvh_parameters,
+     [](const Mesh& mesh, const CostModel&, const Parameters& given, Token& token, BuildLog&) {
+         return build_hlbvh(mesh, hlbvh_config(given), token);
+     }},
+    {"ploc", "PLOC", "parallel locally-ordered clustering; Meister and Bittner 2018",
+     ploc_parameters,
+     [](const Mesh& mesh, const CostModel&, const Parameters& given, Token& token, BuildLog&) {
+         return build_ploc(mesh, ploc_config(given), token);
+     }},
+    {"atrbvh", "ATRBVH", "agglomerative treelet restructuring; Domingues, Pedrini 2015",
+     atrbvh_parameters,
+     [](const Mesh& mesh, const CostModel& model, const Parameters& given, Token& token,
+        BuildLog& log) { return build_atrbvh(mesh, model, atrbvh_config(given), token, log); }},
+    {"prbvh", "PRBVH", "parallel reinsertion; Meister and Bittner 2018", prbvh_parameters,
+     [](const Mesh& mesh, const CostModel& model, const Parameters& given, Token& token,
+        BuildLog& log) { return build_prbvh(mesh, model, prbvh_config(given), token, log); }},
+    {"prbvh_a", "PRBVHᴬ", "parallel reinsertion, simulated annealing; Meister and Bittner 2022",
+     prbvh_a_parameters,
+     [](const Mesh& mesh, const CostModel& model, const Parameters& given, Token& token,
+        BuildLog& log) { return build_prbvh_a(mesh, model, annealing_config(given), token, log); }},
+    {"prbvh_s", "PRBVHₛ", "parallel reinsertion of an SBVH; Meister and Bittner 2022",
+     prbvh_s_parameters,
+     [](const Mesh& mesh, const CostModel& model, const Parameters& given, Token& token,
+        BuildLog& log) {
+         return build_prbvh_s(mesh, model, sbvh_config(given), prbvh_config(given), token, log);
+     }},
+    {"prbvh_sa", "PRBVHₛᴬ",
+     "parallel reinsertion of an SBVH, simulated annealing; Meister and Bittner 2022",
+     prbvh_sa_parameters,
+     [](const Mesh& mesh, const CostModel& model, const Parameters& given, Token& token,
+        BuildLog& log) {
+         return build_prbvh_sa(mesh, model, sbvh_config(given), annealing_config(given), token,
+                               log);
+     }},
     {"sah",
      "SAH",
      "full sweep, top-down; Wald 2007",
@@ -30,6 +72,15 @@ const BuilderInfo all_builders[] = {
     {"sbvh", "SBVH", "spatial splits; Stich, Friedrich, Dietrich 2009", sbvh_parameters,
      [](const Mesh& mesh, const CostModel& model, const Parameters& given, Token& token,
         BuildLog&) { return build_sbvh(mesh, model, sbvh_config(given), token); }},
+    {"trbvh", "TRBVH", "optimal treelets; Karras, Aila 2013", trbvh_parameters,
+     [](const Mesh& mesh, const CostModel& model, const Parameters& given, Token& token,
+        BuildLog& log) { return build_trbvh(mesh, model, trbvh_config(given), token, log); }},
+    {"hybrid", "Hybrid", "SBVH, reinsertion of the nodes above the collapsed leaves; ours",
+     hybrid_parameters,
+     [](const Mesh& mesh, const CostModel& model, const Parameters& given, Token& token,
+        BuildLog& log) {
+         return build_hybrid(mesh, model, sbvh_config(given), prbvh_config(given), token, log);
+     }},
 };
 
 std::string number_text(double value) {

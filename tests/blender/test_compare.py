@@ -13,7 +13,18 @@ import numpy as np
 from blender_support import EmptySceneTest, add_camera, add_cube, add_light
 
 # Every builder but those that take minutes on a scene of usual size.
-SWITCHED_ON = ("lbvh", "hlbvh", "ploc", "atrbvh", "prbvh", "prbvh_s", "sah", "sbvh", "trbvh")
+SWITCHED_ON = (
+    "lbvh",
+    "hlbvh",
+    "ploc",
+    "atrbvh",
+    "prbvh",
+    "prbvh_s",
+    "sah",
+    "sbvh",
+    "trbvh",
+    "hybrid",
+)
 
 
 class Compare(EmptySceneTest):

@@ -15,7 +15,18 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 BUILD = Path(os.environ.get("BVHLAB_BUILD", REPOSITORY / "build"))
 SCRIPT = Path(__file__).with_name("panel_in_blender.py")
 # Every builder but those that take minutes on a scene of usual size.
-SWITCHED_ON = ("lbvh", "hlbvh", "ploc", "atrbvh", "prbvh", "prbvh_s", "sah", "sbvh", "trbvh")
+SWITCHED_ON = (
+    "lbvh",
+    "hlbvh",
+    "ploc",
+    "atrbvh",
+    "prbvh",
+    "prbvh_s",
+    "sah",
+    "sbvh",
+    "trbvh",
+    "hybrid",
+)
 BLENDER = shutil.which("blender", path="/usr/bin")
 
 

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "build/hybrid.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cstring>
+
+#include "base/parallel.h"
+#include "build/leaf_clusters.h"
+#include "bvh/collapse.h"
+#include "bvh/depth_first.h"
+#include "bvh/validate.h"
+#include "meshes.h"
+
+namespace bvhlab {
+namespace {
+
+using namespace test;
+
+BinaryBvh build_base(const Mesh& mesh) {
+    Token token;
+    return build_sbvh(mesh, {}, {}, token);
+}
+
+BinaryBvh build(const Mesh& mesh, const PrbvhConfig& config = {}, BuildLog* log = nullptr) {
+    Token token;
+    BuildLog unused;
+    return build_hybrid(mesh, {}, {}, config, token, log ? *log : unused);
+}
+
+void expect_same(const BinaryBvh& a, const BinaryBvh& b) {
+    ASSERT_EQ(a.node_count(), b.node_count());
+    EXPECT_EQ(a.references, b.references);
+    EXPECT_EQ(0, std::memcmp(a.boxes.data(), b.boxes.data(), a.boxes.size() * sizeof(Box)));
+    for (std::size_t i = 0; i < a.children.size(); ++i) {
+        EXPECT_EQ(a.children[i].left, b.children[i].left);
+        EXPECT_EQ(a.children[i].right, b.children[i].right);
+    }
+}
+
+double collapsed_cost(const BinaryBvh& bvh, const Mesh& mesh, unsigned branching) {
+    Token token;
+    return cost(collapse(bvh, shared(mesh), branching, {}, token), {});
+}
+
+TEST(LeafClusters, ArePutBackWhereTheyWere) {
+    for (const std::size_t count : {1U, 2U, 3U, 50U, 5000U}) {
+        const BinaryBvh base = build_base(random_soup(count));
+        const LeafClusters clusters = cut_leaf_clusters(base, {}, Token());
+        expect_same(put_back(clusters.top, clusters, base, Token()), depth_first(base));
+        std::size_t references = 0;
+        for (const std::uint32_t size : clusters.sizes) references += size;
+        EXPECT_EQ(references, base.reference_count());
+    }
+}
+
+TEST(LeafClusters, AreTheLeavesOfTheCollapse) {
+    const auto mesh = shared(random_soup(5000));
+    const BinaryBvh base = build_base(*mesh);
+    Token token;
+    const Bvh collapsed = collapse(base, mesh, 2, {}, token);
+    EXPECT_EQ(cut_leaf_clusters(base, {}, token).roots.size(), collapsed.leaf_count);
+    EXPECT_LT(collapsed.leaf_count, base.reference_count());
+    // Where a leaf's tests cost nothing, all is one leaf but for the root's children.
+    EXPECT_EQ(cut_leaf_clusters(base, {.traversal = 3.0, .intersection = 1e-9}, token).roots.size(),
+              2U);
+}
+
+TEST(Hybrid, LowersTheCostOfTheCollapsedTree) {
+    const Mesh mesh = random_soup(5000);
+    BuildLog log;
+    const BinaryBvh bvh = build(mesh, {}, &log);
+    validate(bvh, mesh);
+    EXPECT_STREQ(log.ended, "converged");
+    // The log's costs are those of the collapsed tree.
+    const double base = collapsed_cost(build_base(mesh), mesh, 2);
+    EXPECT_NEAR(log.steps.front().cost, base, 1e-4 * base);
+    EXPECT_LE(collapsed_cost(bvh, mesh, 2), log.steps.back().cost * (1.0 + 1e-4));
+    EXPECT_LT(log.steps.back().cost, 0.99 * base);
+    for (const unsigned branching : {4U, 8U})
+        EXPECT_LT(collapsed_cost(bvh, mesh, branching),
+                  collapsed_cost(build_base(mesh), mesh, branching));
+}
+
+TEST(Hybrid, TakesTinyAndOddMeshes) {
+    for (const Mesh& mesh : {random_soup(1), random_soup(2), random_soup(3), copies(300),
+                             growing_chain(60, 4.0), sphere(8)}) {
+        const BinaryBvh bvh = build(mesh);
+        validate(bvh, mesh);
+        EXPECT_LE(collapsed_cost(bvh, mesh, 2),
+                  collapsed_cost(build_base(mesh), mesh, 2) * (1.0 + 1e-6));
+    }
+}
+
+TEST(Hybrid, IsTheSameForAnyThreadCount) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 7);
+    const Mesh mesh = random_soup(20000);
+    const BinaryBvh one = with_threads(1, [&] { return build(mesh); });
+    for (const int threads : {2, 7})
+        expect_same(with_threads(threads, [&] { return build(mesh); }), one);
+}
+
+TEST(Hybrid, StopsAtItsLimitsAndWhenCancelled) {
+    const Mesh mesh = random_soup(5000);
+    BuildLog log;
+    validate(build(mesh, {.iterations = 1}, &log), mesh);
+    EXPECT_STREQ(log.ended, "iteration limit");
+    log = {};
+    validate(build(mesh, {.max_seconds = 1e-9}, &log), mesh);
+    EXPECT_STREQ(log.ended, "time limit");
+    Token token;
+    token.cancel();
+    EXPECT_THROW(build_hybrid(mesh, {}, {}, {}, token, log), Cancelled);
+}
+
+}  // namespace
+}  // namespace bvhlab
