@@ -31,7 +31,11 @@ def add_plan_arguments(parser: argparse.ArgumentParser) -> None:
         help="a builder setting",
     )
     add("--views", metavar="N|A,B", help="how many cameras, or their names (default: 3)")
-    add("--resolution", metavar="WxH|N", help="pixels, or those of the long side (default: 512)")
+    add(
+        "--resolution",
+        metavar="WxH|N",
+        help=f"pixels, or those of the long side (default: {plan.long_side})",
+    )
     add(
         "--samples",
         type=int,

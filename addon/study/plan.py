@@ -32,11 +32,12 @@ BUILDERS = (
 )
 
 # Where the presets differ from the builders' defaults. Annealing: the paper runs 3000 iterations.
-QUICK_ITERATIONS = 200
+QUICK_ITERATIONS = 100
 UNLIMITED_REFERENCES = 2.0**31
 QUICK_PARAMS = {name: {"iterations": float(QUICK_ITERATIONS)} for name in ("prbvh_a", "prbvh_sa")}
 PAPER_PARAMS = {
-    name: {"max_references": UNLIMITED_REFERENCES} for name in ("sbvh", "prbvh_s", "prbvh_sa", "hybrid")
+    name: {"max_references": UNLIMITED_REFERENCES}
+    for name in ("sbvh", "prbvh_s", "prbvh_sa", "hybrid")
 }
 
 
@@ -79,10 +80,10 @@ class Plan:
     devices: list[str] = field(default_factory=lambda: ["cpu"])
     params: dict[str, dict[str, float]] = field(default_factory=lambda: deepcopy(QUICK_PARAMS))
     views: int | list[str] = 3
-    long_side: int = 512
+    long_side: int = 384
     width: int = 0
     height: int = 0
-    samples: int = 4
+    samples: int = 2
     pictures: bool = True
     embree: bool = True
     repeats: int = 3
