@@ -32,7 +32,7 @@ BUILDERS = (
 )
 
 # Where the presets differ from the builders' defaults. Annealing: the paper runs 3000 iterations.
-QUICK_ITERATIONS = 100
+QUICK_ITERATIONS = 200
 UNLIMITED_REFERENCES = 2.0**31
 QUICK_PARAMS = {name: {"iterations": float(QUICK_ITERATIONS)} for name in ("prbvh_a", "prbvh_sa")}
 PAPER_PARAMS = {

@@ -10,7 +10,7 @@ namespace bvhlab {
 struct BuildStep {
     std::uint32_t iteration;  ///< 0: the base tree
     double seconds;           ///< since the build began, the base tree included
-    double cost;  ///< of the best tree so far: Eq. 2, one reference per leaf but for Hybrid
+    double cost;              ///< of the best tree so far: Eq. 2, one reference per leaf
 };
 
 /// What a builder that works in iterations did; empty for the others.

@@ -13,8 +13,8 @@ inline constexpr auto hybrid_parameters = prbvh_s_parameters;
 /// and the nodes above them are optimised by parallel reinsertion as in build_prbvh_s. What is
 /// inside a leaf keeps its topology, for it costs nothing.
 ///
-/// Some 40% of the nodes are left to search and to search through. Costs in the log are Eq. 2 with
-/// those leaves. Numbered depth-first; the same for any thread count. Throws Cancelled.
+/// Some 40% of the nodes are left to search and to search through. Numbered depth-first; the same
+/// for any thread count. Throws Cancelled.
 BinaryBvh build_hybrid(const Mesh& mesh, const CostModel& model, const SbvhConfig& base,
                        const PrbvhConfig& config, Token& token, BuildLog& log);
 

@@ -52,7 +52,6 @@ LeafClusters cut_leaf_clusters(const BinaryBvh& bvh, const CostModel& model, con
         if (nodes[node].is_leaf) {
             number[node] = std::uint32_t(clusters.roots.size());
             clusters.roots.push_back(node);
-            clusters.sizes.push_back(nodes[node].size);
             continue;
         }
         if (interior.size() % nodes_between_checks == 0) token.check();

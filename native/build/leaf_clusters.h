@@ -14,7 +14,6 @@ namespace bvhlab {
 struct LeafClusters {
     BinaryBvh top;               ///< leaf i, without children, stands for ...
     Array<std::uint32_t> roots;  ///< ... this node of the tree that was cut; top.references[i] = i
-    Array<std::uint32_t> sizes;  ///< and for so many references
 };
 
 /// Cuts `bvh` at the nodes that are cheapest as leaves by Eq. 2: those which the collapse to a

@@ -18,7 +18,8 @@ namespace bvhlab {
 class ReinsertionOptimiser {
 public:
     /// Starts from `base`, which must outlive it, and logs it as iteration 0 at `clock`'s time.
-    /// `leaf_cost` is added to every cost, where leaves stand for more than one reference.
+    /// `leaf_cost` is added to every cost: that of what is below the leaves, where they stand for
+    /// more than one reference.
     ReinsertionOptimiser(const BinaryBvh& base, const CostModel& model, const Stopwatch& clock,
                          Token& token, BuildLog& log, double leaf_cost = 0.0);
 

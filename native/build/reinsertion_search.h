@@ -34,13 +34,20 @@ struct Reinsertion {
 ///   root grown around the removed node: a position inside gains at most `gain` less the area of
 ///   the removed node. `area` is the root's half area;
 /// - `ends(gain)`: is no subtree with at most this `gain` worth it any more?
+///
+/// A search ends with what it found after `most_visits` pairs. In ordinary trees it visits some 50;
+/// where thousands of boxes overlap nothing can be pruned, and searches of all nodes would take
+/// quadratic time.
 class ReinsertionSearch {
 public:
+    static constexpr std::uint64_t most_visits = 4096;
+
     explicit ReinsertionSearch(const ReinsertionTree& tree) : tree_(tree) {}
 
     /// For the nodes of `pair`, not the root's, that are `searching`.
     template <class Choice>
     void run(std::uint32_t pair, std::array<Choice, 2>& choices, std::array<bool, 2> searching) {
+        last_visit_ = visits_ + most_visits;
         const SlotPair& family = tree_.pairs[pair];
         const BoxPair boxes = family.boxes();
         for (const std::uint32_t side : {0U, 1U}) {
@@ -72,7 +79,7 @@ public:
                       boxes, side, pivot, choices[side]);
                 searching[side] = shrinks[side] || !choices[side].ends(gains[side]);
             }
-            if (!searching[0] && !searching[1]) return;
+            if ((!searching[0] && !searching[1]) || visits_ >= last_visit_) return;
             pivot = tree_.parent(pivot);
             if (!shrinks[0] && !shrinks[1]) continue;
             rest = unite(rest, other_box);
@@ -135,11 +142,12 @@ private:
                        choice.hopes(gains[side], pair.half_area[side]);
             };
             if (hopes(second)) pending_.push_back({pair.child[second], gains[second]});
-            if (hopes(first)) {
+            if (hopes(first) && visits_ < last_visit_) {
                 subtree = {pair.child[first], gains[first]};
                 continue;
             }
             do {
+                if (visits_ >= last_visit_) pending_.clear();
                 if (pending_.empty()) return;
                 subtree = pending_.back();
                 pending_.pop_back();
@@ -149,7 +157,7 @@ private:
 
     const ReinsertionTree& tree_;
     std::vector<Subtree> pending_;  // empty between descents
-    std::uint64_t visits_ = 0;
+    std::uint64_t visits_ = 0, last_visit_ = 0;
 };
 
 /// The best reinsertion: hill climbing.
