@@ -53,8 +53,8 @@ test-blender: build ## the same tests in Debian's Blender
 test-ui: build ## tests of the panel in a Blender with a window (Xvfb)
 	@$(PYTHON) -m pytest tests/ui
 
-test-scenes: build ## the test that all variants agree, with a million rays in each of ../shared/scenes (an hour or less)
-	@BVHLAB_TEST_RAYS=1000000 $(PYTHON) -m pytest tests/python/test_core_scenes.py
+test-scenes: build ## the test that all variants agree, with a million rays in each of ../shared/scenes (an hour or two)
+	@BVHLAB_TEST_ALL=1 BVHLAB_TEST_RAYS=1000000 $(PYTHON) -m pytest --timeout 0 tests/python/test_core_scenes.py
 
 format: setup ## format all sources
 	@$(CPP_FILES) | xargs .venv/bin/clang-format -i

@@ -21,6 +21,7 @@
 #include "bvh/depth_first.h"
 #include "bvh/validate.h"
 #include "meshes.h"
+#include "same_tree.h"
 
 namespace bvhlab {
 namespace {
@@ -31,18 +32,6 @@ BinaryBvh build(const Mesh& mesh, const AtrbvhConfig& config = {}, BuildLog* log
     Token token;
     BuildLog own_log;
     return build_atrbvh(mesh, CostModel{}, config, token, log ? *log : own_log);
-}
-
-void expect_same(const BinaryBvh& a, const BinaryBvh& b) {
-    EXPECT_EQ(a.references, b.references);
-    EXPECT_EQ(0, std::memcmp(a.children.data(), b.children.data(),
-                             a.children.size() * sizeof(a.children[0])));
-    EXPECT_EQ(0, std::memcmp(a.boxes.data(), b.boxes.data(), a.boxes.size() * sizeof(a.boxes[0])));
-}
-
-Mesh scaled(Mesh mesh, float factor) {
-    for (glm::vec3& vertex : mesh.vertices) vertex *= factor;
-    return make_mesh(std::move(mesh.vertices), std::move(mesh.triangles));
 }
 
 /// Triangles squeezed into a plane (one axis flat), a line (two), or a point (three).
@@ -270,7 +259,7 @@ TEST(Atrbvh, LeavesTreesSmallerThanATreelet) {
     const Mesh mesh = random_soup(19);
     Token token;
     BuildLog log;
-    expect_same(build(mesh, {}, &log), depth_first(build_lbvh(mesh, token)));
+    EXPECT_TRUE(same(build(mesh, {}, &log), depth_first(build_lbvh(mesh, token))));
     EXPECT_STREQ(log.ended, "converged");
 }
 
@@ -289,7 +278,7 @@ TEST(Atrbvh, KeepsToItsLimits) {
     const Mesh mesh = random_soup(20000);
     Token token;
     BuildLog log;
-    expect_same(build(mesh, {.iterations = 0}, &log), depth_first(build_lbvh(mesh, token)));
+    EXPECT_TRUE(same(build(mesh, {.iterations = 0}, &log), depth_first(build_lbvh(mesh, token))));
     EXPECT_EQ(log.steps.size(), 1U);
     EXPECT_STREQ(log.ended, "iteration limit");
 
@@ -313,7 +302,7 @@ TEST(Atrbvh, IsTheSameForAnyThreadCount) {
         BuildLog one_log, many_log;
         const BinaryBvh one = with_threads(1, [&] { return build(mesh, {}, &one_log); });
         const BinaryBvh many = with_threads(7, [&] { return build(mesh, {}, &many_log); });
-        expect_same(one, many);
+        EXPECT_TRUE(same(one, many));
         for (std::size_t i = 0; i < one_log.steps.size(); ++i)
             EXPECT_EQ(one_log.steps[i].cost, many_log.steps[i].cost);
     }
@@ -326,7 +315,7 @@ TEST(Atrbvh, IsTheSameForAnyInstructionSet) {
     for (auto target = supported & -supported, rest = supported; rest != 0;
          rest &= rest - 1, target = rest & -rest) {
         hwy::SetSupportedTargetsForTest(target);
-        expect_same(best, build(mesh));
+        EXPECT_TRUE(same(best, build(mesh)));
     }
     hwy::SetSupportedTargetsForTest(0);
 }

@@ -4,14 +4,13 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include <cstring>
-
 #include "base/parallel.h"
 #include "build/leaf_clusters.h"
 #include "bvh/collapse.h"
 #include "bvh/depth_first.h"
 #include "bvh/validate.h"
 #include "meshes.h"
+#include "same_tree.h"
 
 namespace bvhlab {
 namespace {
@@ -29,16 +28,6 @@ BinaryBvh build(const Mesh& mesh, const PrbvhConfig& config = {}, BuildLog* log 
     return build_hybrid(mesh, {}, {}, config, token, log ? *log : unused);
 }
 
-void expect_same(const BinaryBvh& a, const BinaryBvh& b) {
-    ASSERT_EQ(a.node_count(), b.node_count());
-    EXPECT_EQ(a.references, b.references);
-    EXPECT_EQ(0, std::memcmp(a.boxes.data(), b.boxes.data(), a.boxes.size() * sizeof(Box)));
-    for (std::size_t i = 0; i < a.children.size(); ++i) {
-        EXPECT_EQ(a.children[i].left, b.children[i].left);
-        EXPECT_EQ(a.children[i].right, b.children[i].right);
-    }
-}
-
 double collapsed_cost(const BinaryBvh& bvh, const Mesh& mesh, unsigned branching) {
     Token token;
     return cost(collapse(bvh, shared(mesh), branching, {}, token), {});
@@ -48,7 +37,7 @@ TEST(LeafClusters, ArePutBackWhereTheyWere) {
     for (const std::size_t count : {1U, 2U, 3U, 50U, 5000U}) {
         const BinaryBvh base = build_base(random_soup(count));
         const LeafClusters clusters = cut_leaf_clusters(base, {}, Token());
-        expect_same(put_back(clusters.top, clusters, base, Token()), depth_first(base));
+        EXPECT_TRUE(same(put_back(clusters.top, clusters, base, Token()), depth_first(base)));
     }
 }
 
@@ -93,7 +82,7 @@ TEST(Hybrid, IsTheSameForAnyThreadCount) {
     const Mesh mesh = random_soup(20000);
     const BinaryBvh one = with_threads(1, [&] { return build(mesh); });
     for (const int threads : {2, 7})
-        expect_same(with_threads(threads, [&] { return build(mesh); }), one);
+        EXPECT_TRUE(same(with_threads(threads, [&] { return build(mesh); }), one));
 }
 
 TEST(Hybrid, StopsAtItsLimitsAndWhenCancelled) {

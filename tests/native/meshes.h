@@ -39,6 +39,11 @@ inline Mesh random_soup(std::size_t count, float size = 0.1F, std::uint32_t seed
     return make_mesh(std::move(vertices), std::move(triangles));
 }
 
+inline Mesh scaled(Mesh mesh, float factor) {
+    for (glm::vec3& vertex : mesh.vertices) vertex *= factor;
+    return make_mesh(std::move(mesh.vertices), std::move(mesh.triangles));
+}
+
 /// `count` copies of one triangle.
 inline Mesh copies(std::size_t count) {
     return make_mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}},

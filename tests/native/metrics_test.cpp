@@ -173,16 +173,11 @@ TEST(Metrics, AreTheSameForAnyThreadCount) {
     }
 }
 
-Mesh scaled(Mesh mesh, float factor) {
-    for (glm::vec3& vertex : mesh.vertices) vertex *= factor;
-    return make_mesh(std::move(mesh.vertices), std::move(mesh.triangles));
-}
-
 TEST(Metrics, DoNotDependOnTheUnit) {
     const Metrics plain = measured(build(shared(random_soup(500, 0.3F)), "sah", 4));
     // Powers of two, so that the vertices keep all their digits.
     for (const float factor : {0x1p-100F, 0x1p100F, 0x1p120F}) {
-        const Bvh bvh = build(shared(scaled(random_soup(500, 0.3F), factor)), "sah", 4);
+        const Bvh bvh = build(shared(test::scaled(random_soup(500, 0.3F), factor)), "sah", 4);
         const Metrics metrics = measured(bvh);
         EXPECT_NEAR(metrics.epo, plain.epo, 1e-12 * plain.epo);
         EXPECT_NEAR(metrics.leaf_counts.mean, plain.leaf_counts.mean, 1e-9);
@@ -215,8 +210,8 @@ TEST(Metrics, AreZeroWhereThereIsNoArea) {
 TEST(Metrics, AreFiniteOnHardInputs) {
     for (Mesh& mesh : std::vector<Mesh>{
              growing_chain(2000, 1.04), growing_chain(100, 3.0), random_soup(1), random_soup(2),
-             scaled(random_soup(500), 1e-40F), scaled(random_soup(500), 1e30F),
-             scaled(random_soup(500), 1e-30F), copies(1000)}) {
+             test::scaled(random_soup(500), 1e-40F), test::scaled(random_soup(500), 1e30F),
+             test::scaled(random_soup(500), 1e-30F), copies(1000)}) {
         const auto part = shared(std::move(mesh));
         for (const unsigned branching : {2U, 8U}) {
             const Metrics metrics = measured(build(part, "lbvh", branching));

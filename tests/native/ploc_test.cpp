@@ -9,13 +9,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <vector>
 
 #include "base/parallel.h"
 #include "build/morton_order.h"
 #include "bvh/validate.h"
 #include "meshes.h"
+#include "same_tree.h"
 #include "topology.h"
 
 namespace bvhlab {
@@ -67,11 +67,6 @@ std::string plain_ploc(const Mesh& mesh, const PlocConfig& config) {
     return row[0].tree;
 }
 
-Mesh scaled(Mesh mesh, float factor) {
-    for (glm::vec3& vertex : mesh.vertices) vertex *= factor;
-    return make_mesh(std::move(mesh.vertices), std::move(mesh.triangles));
-}
-
 /// Every triangle `times` times, not in a row.
 Mesh repeated(Mesh mesh, int times) {
     const std::size_t count = mesh.size();
@@ -86,13 +81,6 @@ std::size_t depth(const BinaryBvh& bvh) {
         for (const std::uint32_t child : {bvh.children[node].left, bvh.children[node].right})
             depths[child] = depths[node] + 1;
     return std::ranges::max(depths);
-}
-
-bool same(const BinaryBvh& a, const BinaryBvh& b) {
-    return a.references == b.references &&
-           std::memcmp(a.children.data(), b.children.data(),
-                       a.children.size() * sizeof(a.children[0])) == 0 &&
-           std::memcmp(a.boxes.data(), b.boxes.data(), a.boxes.size() * sizeof(a.boxes[0])) == 0;
 }
 
 TEST(Ploc, IsThePlainOne) {

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <thread>
 #include <vector>
@@ -21,6 +20,7 @@
 #include "bvh/collapse.h"
 #include "bvh/validate.h"
 #include "meshes.h"
+#include "same_tree.h"
 
 namespace bvhlab {
 namespace {
@@ -35,13 +35,6 @@ BinaryBvh build(const Mesh& mesh, const SbvhConfig& config = {}) {
 /// Splits as often as anything is to be gained.
 SbvhConfig eager() {
     return {.alpha = 0.0, .max_leaf_size = 1, .max_references = 16.0};
-}
-
-bool same(const BinaryBvh& a, const BinaryBvh& b) {
-    return a.references == b.references &&
-           std::memcmp(a.children.data(), b.children.data(),
-                       a.children.size() * sizeof(a.children[0])) == 0 &&
-           std::memcmp(a.boxes.data(), b.boxes.data(), a.boxes.size() * sizeof(a.boxes[0])) == 0;
 }
 
 /// Long thin triangles in all directions: what spatial splits are for.
