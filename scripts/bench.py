@@ -172,7 +172,7 @@ def bench(path: Path, out: Path, arguments: argparse.Namespace) -> None:
         f"{machine.cpu}, {machine.cores} cores, {core.devices()[0]['simd']}, "
         f"Embree {machine.embree}, {plan.width}x{plan.height}",
         "",
-        *bench_builds(path, mesh, plan, 3 if large else arguments.repeats),
+        *bench_builds(path, mesh, plan, min(3, arguments.repeats) if large else arguments.repeats),
         "",
     ]
     print("\n".join(lines), flush=True)

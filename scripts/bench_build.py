@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-import multiprocessing
+import json
+import subprocess
+import sys
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -85,9 +86,10 @@ def build_contenders(mesh: Any, plan: Plan) -> dict[str, Callable[[], float]]:
 
 def cost_and_peak(path: Path, builder: str, plan: Plan) -> tuple[str, int]:
     """The tree's cost as text, and the build's peak of memory in bytes, in a process of its own."""
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(1, mp_context=context) as pool:
-        cost, peak = pool.submit(_build_alone, path, builder, plan.params.get(builder, {})).result()
+    params = json.dumps(plan.params.get(builder, {}))
+    command = [sys.executable, __file__, str(path), builder, params]
+    run = subprocess.run(command, check=True, capture_output=True, text=True)
+    cost, peak = json.loads(run.stdout)
     return f"{cost:.1f}", peak
 
 
@@ -104,3 +106,7 @@ def _memory(name: str) -> int:
     """A field of /proc/self/status in bytes."""
     lines = Path("/proc/self/status").read_text().splitlines()
     return next(1024 * int(line.split()[1]) for line in lines if line.startswith(f"{name}:"))
+
+
+if __name__ == "__main__":
+    print(json.dumps(_build_alone(Path(sys.argv[1]), sys.argv[2], json.loads(sys.argv[3]))))
