@@ -38,12 +38,11 @@ from .machine import describe_machine, free_bytes
 from .plan import Plan
 from .progress import Event, Progress, RowChanged, Step
 from .rays import RaySet, View, choose_views, core_scene, generate_rays, judge_rays
-from .results import KINDS, Measurement, Picture, Result, Row, Subject
+from .remarks import SLOW_BUILD_SECONDS, iteration_notes, measuring_notes, missing_ray_notes
+from .results import Measurement, Picture, Result, Row, Subject
 from .scene import Float32Array, Scene
 
 __all__ = ["Event", "RowChanged", "Step", "Study", "compare"]
-
-SLOW_BUILD_SECONDS = 10.0  # a tree that takes longer is built and timed once
 
 
 @dataclass
@@ -119,7 +118,9 @@ class _Runner:
         except self.core.Cancelled:
             self.result.cancelled = True
             self.result.notes.append("Stopped early: rows hold what was measured until then.")
-        self._note_what_is_missing()
+        self.result.notes += iteration_notes(self.result.rows)
+        self.result.notes += measuring_notes(self.plan, self.group, self.slow_builds)
+        self.result.notes += missing_ray_notes(self.result, self.views)
         self.result.seconds = time.perf_counter() - start
         return self.study
 
@@ -365,40 +366,6 @@ class _Runner:
     def _trace_step(self, view: View, stage: str) -> Iterator[None]:
         with self.progress.step("trace", self.guess.trace(view), stage):
             yield
-
-    def _note_what_is_missing(self) -> None:
-        notes, plan = self.result.notes, self.plan
-        notes += _iteration_notes(self.result.rows)
-        if self.slow_builds:
-            notes.append(
-                f"Built and timed once, for it took more than {SLOW_BUILD_SECONDS:g} s: "
-                f"{', '.join(self.slow_builds)}."
-            )
-        if plan.width:
-            notes.append(
-                f"Pictures are {plan.width}x{plan.height} whatever the cameras' shape: each keeps "
-                "what it sees along its longer side."
-            )
-        if self.group > 1:
-            notes.append(
-                "The trees do not fit in memory together: variants were measured in "
-                f"{self.group} groups, and only within a group were they timed interleaved."
-            )
-        for view in self.views:
-            missing = set(KINDS) - {rays.kind for rays in view.sets}
-            if self.result.reference and not self.result.cancelled and missing:
-                kinds = " and ".join(sorted(missing))
-                notes.append(f"View {view.name} has no {kinds} rays: no primary ray hit anything.")
-
-
-def _iteration_notes(rows: Sequence[Row]) -> list[str]:
-    """How the builders that work in iterations ended, a sentence each."""
-    ends = {
-        row.label: f"{row.label}: {row.tree.iterations} iterations, then {row.tree.ended}."
-        for row in rows
-        if row.tree and row.tree.ended
-    }
-    return list(ends.values())
 
 
 def _subject(scene: Scene, views: Sequence[View]) -> Subject:
