@@ -37,7 +37,16 @@ RAYS = int(os.environ.get("BVHLAB_TEST_RAYS", "50000"))
 BRUTE_FORCE_TESTS = 1_000_000_000
 FULL = os.environ.get("BVHLAB_TEST_ALL") == "1"
 # Triangles above which a short run leaves out builders that take long.
-SLOW = {"sbvh": 1e6, "prbvh": 3e5, "prbvh_s": 2e5, "hybrid": 3e5, "prbvh_a": 5e4, "prbvh_sa": 5e4}
+SLOW = {
+    "sah": 2e6,
+    "trbvh": 2e6,
+    "sbvh": 1e6,
+    "prbvh": 3e5,
+    "prbvh_s": 2e5,
+    "hybrid": 3e5,
+    "prbvh_a": 5e4,
+    "prbvh_sa": 5e4,
+}
 
 PAPER = SCENES.parent / "paper" / "bvh_cost.csv"  # Table 3, with c_T = 3, c_I = 2
 PAPER_NAMES = {"crytek_sponza": "CrytekSponza", "sibenik": "Sibenik"}
