@@ -39,7 +39,7 @@ lint: build ## check format, style and types
 	@MYPYPATH=build .venv/bin/mypy --strict -p bvh_lab.study
 
 test-native: build ## tests of the C++ core
-	@ctest --test-dir build --no-tests=error --output-on-failure --timeout 600
+	@ctest --test-dir build --parallel 2 --no-tests=error --output-on-failure --timeout 600
 
 test-python: build ## tests of the Python API and of the study, without Blender
 	@$(PYTHON) -m pytest tests/python
