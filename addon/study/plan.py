@@ -117,10 +117,12 @@ class Plan:
                 "settings; the paper's path tracing is not part of this version, so shadow and "
                 "random diffuse rays start at the primary hits only."
             )
-        return (
-            "Preset quick: less resolution and fewer samples than the paper's 1024x768 and 32, and "
-            f"{QUICK_ITERATIONS} instead of 3000 iterations of annealing."
-        )
+        note = "Preset quick: less resolution and fewer samples than the paper's 1024x768 and 32."
+        for builder in self.builders:
+            if builder in QUICK_PARAMS and "iterations" in self.params.get(builder, {}):
+                iterations = self.params[builder]["iterations"]
+                note += f" {builder}: {iterations:g} iterations of annealing, the paper's are 3000."
+        return note
 
     def variants(self) -> list[Variant]:
         """All combinations, builders slowest."""

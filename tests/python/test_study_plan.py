@@ -43,6 +43,12 @@ def test_the_default_is_every_builder_of_the_core() -> None:
     assert Plan().builders == list(BUILDERS)
 
 
+def test_the_note_tells_the_iterations_that_are_run() -> None:
+    plan = plan_of("--builders", "sah,prbvh_a", "--param", "prbvh_a.iterations=7")
+    assert "prbvh_a: 7 iterations" in plan.preset_note()
+    assert "prbvh_sa" not in plan.preset_note()
+
+
 def test_presets_do_not_share_their_settings() -> None:
     Plan().params["prbvh_a"]["iterations"] = 1.0
     assert Plan().params["prbvh_a"]["iterations"] > 1.0
