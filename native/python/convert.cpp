@@ -104,4 +104,13 @@ void check_threads(int threads) {
         throw py::value_error("threads must be 0 (all) to 4096, not " + std::to_string(threads));
 }
 
+Reorder reorder_from_python(const py::handle& argument) {
+    if (py::isinstance<py::bool_>(argument))
+        return argument.cast<bool>() ? Reorder::aila : Reorder::off;
+    if (!py::isinstance<py::str>(argument))
+        throw py::value_error("reorder must be True, False or a name, not " +
+                              py::repr(argument).cast<std::string>());
+    return reorder_named(argument.cast<std::string>());
+}
+
 }  // namespace bvhlab

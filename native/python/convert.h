@@ -12,6 +12,7 @@
 #include "bvh/wide_bvh.h"
 #include "scene/mesh.h"
 #include "trace/ray.h"
+#include "trace/reorder.h"
 
 namespace bvhlab {
 
@@ -64,7 +65,7 @@ struct PyBvh {
 
 /// What core.trace, core.brute_force and EmbreeScene.trace return (class `Hits` in Python).
 struct PyHits {
-    py::object t, u, v, triangle, occluded, node_visits, triangle_tests;
+    py::object t, u, v, triangle, occluded, node_visits, box_tests, triangle_tests;
     double key_seconds = 0, sort_seconds = 0, traverse_seconds = 0;
 };
 
@@ -82,6 +83,7 @@ PyHits to_python(HitsOf<Real>&& hits, bool any_hit, bool counted) {
     result.triangle = give(!any_hit, hits.triangle);
     result.occluded = to_numpy(std::move(hits.occluded)).view("bool");
     result.node_visits = give(counted, hits.node_visits);
+    result.box_tests = give(counted, hits.box_tests);
     result.triangle_tests = give(counted, hits.triangle_tests);
     result.key_seconds = hits.key_seconds;
     result.sort_seconds = hits.sort_seconds;
@@ -95,6 +97,10 @@ std::shared_ptr<Token> token_or_new(const std::shared_ptr<Token>& token);
 /// Throws ValueError unless 0 <= threads <= 4096.
 void check_threads(int threads);
 
+/// The `reorder` argument of every function that traces: True or False, or a name of
+/// reorder_names. Throws ValueError for anything else.
+Reorder reorder_from_python(const py::handle& argument);
+
 /// Throws ValueError for a device that does not exist.
 void check_device(const std::string& device);
 
@@ -102,7 +108,8 @@ void bind_core(py::module_& module);       // Token, Mesh, trace, devices, featu
 void bind_build(py::module_& module);      // builders, build_tree, Tree, build, Bvh
 void bind_metrics(py::module_& module);    // metrics
 void bind_reference(py::module_& module);  // brute_force, embree, EmbreeScene
-void bind_render(py::module_& module);     // Camera, Light, Scene, rays, render
+void bind_scene(py::module_& module);      // Camera, Light, World, Texture, Material, Scene
+void bind_render(py::module_& module);     // rays, render
 void bind_image(py::module_& module);      // write_image, image_difference
 
 }  // namespace bvhlab

@@ -9,6 +9,7 @@ PYBIND11_MODULE(_core, module) {
     bvhlab::bind_build(module);
     bvhlab::bind_metrics(module);
     bvhlab::bind_reference(module);
+    bvhlab::bind_scene(module);
     bvhlab::bind_render(module);
     bvhlab::bind_image(module);
 }

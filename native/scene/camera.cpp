@@ -39,6 +39,10 @@ void check_camera(const Camera& camera) {
             "and bottom below top");
     if (!std::isfinite(camera.clip_start) || camera.clip_start < 0.0)
         throw std::invalid_argument("the camera's clip_start must be finite and not negative");
+    if (!std::isfinite(camera.lens_radius) || camera.lens_radius < 0.0)
+        throw std::invalid_argument("the camera's lens_radius must be finite and not negative");
+    if (!std::isfinite(camera.focus_distance) || !(camera.focus_distance > 0.0))
+        throw std::invalid_argument("the camera's focus_distance must be finite and above 0");
 }
 
 }  // namespace bvhlab

@@ -15,6 +15,11 @@ bool is_size(double value) {
     return std::isfinite(value) && value >= 0.0;
 }
 
+double area_of(const Light& light) {
+    return glm::length(glm::cross(light.size_x * glm::dvec3(light.to_world[0]),
+                                  light.size_y * glm::dvec3(light.to_world[1])));
+}
+
 }  // namespace
 
 void check_light(const Light& light) {
@@ -29,6 +34,10 @@ void check_light(const Light& light) {
                                     ": it must be finite and not negative");
     if (!is_size(light.size_x) || !is_size(light.size_y))
         throw std::invalid_argument("the light's size must be finite and not negative");
+    if (light.kind == LightKind::area && !(area_of(light) > 0.0))
+        throw std::invalid_argument(
+            "the area light has no area, so it emits nothing: give it a width and a height above "
+            "0, or leave it out");
     if (light.kind == LightKind::sun && light.size_x > std::numbers::pi)
         throw std::invalid_argument("the sun's angular diameter must be at most pi");
     if (!(light.spot_angle > 0.0) || !(light.spot_angle <= std::numbers::pi + 1e-6))
