@@ -49,17 +49,18 @@ std::shared_ptr<Mesh> mesh_from_python(const py::handle& vertices, const py::han
 // --- calls ---------------------------------------------------------------------------------------
 
 PyHits trace_rays(const PyBvh& self, const py::object& origins, const py::object& directions,
-                  const py::object& t_min, const py::object& t_max, bool any_hit, bool reorder,
-                  const std::string& device, int threads, bool count,
+                  const py::object& t_min, const py::object& t_max, bool any_hit,
+                  const py::object& reorder, const std::string& device, int threads, bool count,
                   const std::shared_ptr<Token>& given_token) {
     check_device(device);
     check_threads(threads);
     const RayArguments rays(origins, directions, t_min, t_max);
+    const TraceOptions options{any_hit, reorder_from_python(reorder), count, threads};
     const auto token = token_or_new(given_token);
     Hits hits;
     {
         const py::gil_scoped_release release;
-        hits = trace(self.bvh, rays.batch(), {any_hit, reorder, count, threads}, *token);
+        hits = trace(self.bvh, rays.batch(), options, *token);
     }
     return to_python(std::move(hits), any_hit, count);
 }
@@ -161,6 +162,7 @@ void bind_hits(py::module_& module) {
         .def_readonly("triangle", &PyHits::triangle)
         .def_readonly("occluded", &PyHits::occluded)
         .def_readonly("node_visits", &PyHits::node_visits)
+        .def_readonly("box_tests", &PyHits::box_tests)
         .def_readonly("triangle_tests", &PyHits::triangle_tests)
         .def_readonly("key_seconds", &PyHits::key_seconds)
         .def_readonly("sort_seconds", &PyHits::sort_seconds)
@@ -176,11 +178,15 @@ void bind_core(py::module_& module) {
     bind_token(module);
     bind_mesh(module);
     bind_hits(module);
-    module.def("trace", &trace_rays, py::arg("bvh"), py::arg("origins"), py::arg("directions"),
-               py::arg("t_min") = 0.0F, py::arg("t_max") = std::numeric_limits<float>::infinity(),
-               py::arg("any_hit") = false, py::arg("reorder") = false, py::arg("device") = "cpu",
-               py::arg("threads") = 0, py::arg("count") = false, py::arg("token") = nullptr,
-               "Traces rays (N, 3) float32. Raises ValueError naming the first bad ray.");
+    module.def(
+        "trace", &trace_rays, py::arg("bvh"), py::arg("origins"), py::arg("directions"),
+        py::arg("t_min") = 0.0F, py::arg("t_max") = std::numeric_limits<float>::infinity(),
+        py::arg("any_hit") = false, py::arg("reorder") = false, py::arg("device") = "cpu",
+        py::arg("threads") = 0, py::arg("count") = false, py::arg("token") = nullptr,
+        "Traces rays (N, 3) float32. `reorder` sorts them first: False or \"off\", True or "
+        "\"aila\", \"origin\", \"octahedron\", \"two_point\"; hits come in the order given and "
+        "are the same. `count` fills node_visits, box_tests and triangle_tests, (N,) uint32. "
+        "Raises ValueError naming the first bad ray.");
     module.def("devices", &list_devices,
                "The devices there are; `reason` says why one is left out.");
     module.def("features", &features, "What this build of the core holds.");

@@ -49,6 +49,7 @@ struct HitsOf {
     Array<std::uint32_t> triangle;        ///< closest hit only
     Array<std::uint8_t> occluded;         ///< always: 1 where something was hit
     Array<std::uint32_t> node_visits;     ///< interior nodes visited, when counted
+    Array<std::uint32_t> box_tests;       ///< boxes of those nodes' children, missing ones not
     Array<std::uint32_t> triangle_tests;  ///< triangles tested, unused lanes not counted
 
     double key_seconds = 0.0;  ///< computing sort keys

@@ -6,7 +6,6 @@
 #include <atomic>
 
 #include "base/parallel.h"
-#include "trace/reorder.h"
 #include "trace/traverse.h"
 
 namespace bvhlab {
@@ -25,6 +24,7 @@ Hits make_hits(std::size_t rays, const TraceOptions& options) {
     }
     if (options.count) {
         hits.node_visits.resize(rays);
+        hits.box_tests.resize(rays);
         hits.triangle_tests.resize(rays);
     }
     return hits;
@@ -54,12 +54,12 @@ Hits trace(const Bvh& bvh, const RayBatch& rays, const TraceOptions& options, To
     Hits hits = make_hits(rays.size(), options);
     with_threads(options.threads, [&] {
         RayOrder ordered{};
-        if (options.reorder) ordered = order_rays(rays, bvh.mesh->bounds, token);
+        const bool reorder = options.reorder != Reorder::off;
+        if (reorder) ordered = order_rays(options.reorder, rays, bvh.mesh->bounds, token);
         hits.key_seconds = ordered.key_seconds;
         hits.sort_seconds = ordered.sort_seconds;
         const Stopwatch watch;
-        traverse_all(bvh, rays, options, options.reorder ? ordered.order.data() : nullptr, hits,
-                     token);
+        traverse_all(bvh, rays, options, reorder ? ordered.order.data() : nullptr, hits, token);
         hits.traverse_seconds = watch.seconds();
     });
     return hits;

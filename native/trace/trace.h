@@ -4,14 +4,15 @@
 #include "base/token.h"
 #include "bvh/wide_bvh.h"
 #include "trace/ray.h"
+#include "trace/reorder.h"
 
 namespace bvhlab {
 
 struct TraceOptions {
-    bool any_hit = false;  ///< stop at the first hit found; only `occluded` is answered
-    bool reorder = false;  ///< trace in the order of the rays' Morton keys (reorder.h)
-    bool count = false;    ///< fill node_visits and triangle_tests (slower)
-    int threads = 0;       ///< 0: all
+    bool any_hit = false;            ///< stop at the first hit found; only `occluded` is answered
+    Reorder reorder = Reorder::off;  ///< trace in the order of the rays' keys
+    bool count = false;              ///< fill node_visits, box_tests, triangle_tests (slower)
+    int threads = 0;                 ///< 0: all
 };
 
 /// Traces every ray. The answer depends on mesh and ray alone, bit for bit: not on the tree, its

@@ -114,10 +114,10 @@ public:
     Traversal(const WideBvh<K>& tree, const Box& bounds, StackEntry* stack)
         : tree_(tree), bounds_(bounds), stack_(stack) {}
 
-    std::uint32_t node_visits = 0, triangle_tests = 0;
+    std::uint32_t node_visits = 0, box_tests = 0, triangle_tests = 0;
 
     Hit closest_or_any(const Ray& given) {
-        node_visits = triangle_tests = 0;
+        node_visits = box_tests = triangle_tests = 0;
         const PreparedRay ray(given, bounds_);
         Hit hit{ray.t_max, 0.0F, 0.0F, no_triangle};
         if (!(ray.t_min <= ray.t_max)) return hit;
@@ -146,8 +146,11 @@ private:
     /// go on the stack, the least urgent first. Returns false where none is entered.
     HWY_INLINE bool descend(const PreparedRay& ray, float t_far, StackEntry& current,
                             StackEntry*& top) {
-        if constexpr (Count) ++node_visits;
         const WideNode<K>& node = tree_.nodes[current.child];
+        if constexpr (Count) {
+            ++node_visits;
+            for (unsigned i = 0; i < K; ++i) box_tests += !node.is_missing(i);
+        }
         HWY_ALIGN float urgency[K];
         unsigned entered = enter_children<K, AnyHit>(node, ray, t_far, urgency);
         if (entered == 0) return false;
@@ -216,6 +219,7 @@ void traverse_share(const TraceTask& task, const WideBvh<K>& tree) {
         }
         if constexpr (Count) {
             hits.node_visits[ray] = traversal.node_visits;
+            hits.box_tests[ray] = traversal.box_tests;
             hits.triangle_tests[ray] = traversal.triangle_tests;
         }
     }
