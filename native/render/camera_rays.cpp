@@ -5,16 +5,26 @@
 #include <glm/vec2.hpp>
 
 #include "base/parallel.h"
+#include "render/sample_shapes.h"
 #include "render/sampler.h"
 
 namespace bvhlab {
 
+namespace {
+
+CameraRay placed(const Camera& camera, const glm::dvec3& origin, const glm::dvec3& direction) {
+    return {glm::vec3(camera.to_world * glm::dvec4(origin, 1.0)),
+            glm::vec3(glm::normalize(glm::dvec3(camera.to_world * glm::dvec4(direction, 0.0))))};
+}
+
+}  // namespace
+
 CameraRay camera_ray(const Camera& camera, const Raster& raster, std::uint32_t pixel,
                      std::uint32_t sample) {
     // Choose the point of the pixel, in pixels from the top left corner.
+    const Sampler random(pixel, sample, raster.seed);
     glm::dvec2 point(pixel % raster.width, pixel / raster.width);
-    point +=
-        sample == 0 ? glm::dvec2(0.5) : Sampler(pixel, sample, raster.seed).pair(camera_dimension);
+    point += sample == 0 ? glm::dvec2(0.5) : random.pair(camera_dimension);
 
     // Find it in the window.
     const double x = camera.left + (camera.right - camera.left) * (point.x / raster.width);
@@ -25,8 +35,14 @@ CameraRay camera_ray(const Camera& camera, const Raster& raster, std::uint32_t p
     const glm::dvec3 direction = perspective ? glm::dvec3(x, y, -1.0) : glm::dvec3(0.0, 0.0, -1.0);
     const glm::dvec3 origin =
         perspective ? direction * camera.clip_start : glm::dvec3(x, y, -camera.clip_start);
-    return {glm::vec3(camera.to_world * glm::dvec4(origin, 1.0)),
-            glm::vec3(glm::normalize(glm::dvec3(camera.to_world * glm::dvec4(direction, 0.0))))};
+    if (camera.lens_radius == 0.0) return placed(camera, origin, direction);
+
+    // From a point of the lens instead, to where the ray through its centre is in focus.
+    const glm::dvec3 lens(camera.lens_radius * sample_disk(random.pair(lens_dimension)), 0.0);
+    const glm::dvec3 centre = perspective ? glm::dvec3(0.0) : glm::dvec3(x, y, 0.0);
+    const glm::dvec3 to_focus = direction * camera.focus_distance - lens;
+    const glm::dvec3 start = centre + lens + to_focus * (camera.clip_start / camera.focus_distance);
+    return placed(camera, start, to_focus);
 }
 
 RayArrays camera_rays(const Camera& camera, const Raster& raster, std::uint32_t sample, int threads,

@@ -26,7 +26,8 @@ struct Raster {
 
 /// The ray of one sample of one pixel; pixels are counted row by row from the top left.
 /// Sample 0 goes through the pixel's centre, the others are spread over the pixel (box filter).
-/// Computed in double and rounded once to float.
+/// With a lens, rays start at random points of it and those of one point of the picture meet in the
+/// focus plane. Computed in double and rounded once to float.
 CameraRay camera_ray(const Camera& camera, const Raster& raster, std::uint32_t pixel,
                      std::uint32_t sample);
 

@@ -3,11 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <numbers>
 
+#include "base/parallel.h"
+#include "render/bsdf.h"
+#include "render/compact.h"
+#include "render/interpolate.h"
+#include "render/material_input.h"
 #include "render/offset.h"
 #include "render/sample_shapes.h"
-#include "render/spherical_rectangle.h"
 #include "scene/color.h"
 
 namespace bvhlab {
@@ -15,190 +20,180 @@ namespace {
 
 using std::numbers::pi;
 
-glm::dvec3 axis(const Light& light, int index) {
-    return glm::dvec3(light.to_world[index]);
-}
-/// Unit vector against the direction in which the lamp shines.
-glm::dvec3 shining_back(const Light& light) {
-    return glm::normalize(axis(light, 2));
-}
-glm::dvec3 centre(const Light& light) {
-    return glm::dvec3(light.to_world[3]);
-}
-
-/// Share of a spot's intensity in the unit direction `away` from it: smoothstep from the cone's
-/// edge over the blended part of the cosine.
-double spot_falloff(const Light& light, const glm::dvec3& away) {
-    const double edge = std::cos(0.5 * light.spot_angle);
-    const double inside = -glm::dot(away, shining_back(light)) - edge;
-    if (!(inside > 0.0)) return 0.0;
-    const double blended = (1.0 - edge) * light.spot_blend;
-    if (inside >= blended) return 1.0;
-    const double x = inside / blended;
-    return x * x * (3.0 - 2.0 * x);
-}
-
-/// A disk that faces the position, of intensity P / (4 pi) along its axis. (Cycles' "soft falloff",
-/// the default; it stays finite where the lamp touches a surface, and is a sphere's look from
-/// afar.)
-LightSample sample_point(const Light& light, const glm::dvec3& position, const glm::dvec2& random) {
-    LightSample sample{centre(light) - position, false, glm::dvec3(0.0)};
-    const double distance = glm::length(sample.to_light);
-    if (distance == 0.0) return sample;
-    const glm::dvec3 facing = sample.to_light / distance;
-    if (light.size_x > 0.0)
-        sample.to_light +=
-            basis_about(facing) * glm::dvec3(light.size_x * sample_disk(random), 0.0);
-    const double squared = glm::dot(sample.to_light, sample.to_light);
-    sample.irradiance =
-        glm::dvec3(light.color) * (distance / (4.0 * pi * squared * std::sqrt(squared)));
-    return sample;
-}
-
-LightSample sample_spot(const Light& light, const glm::dvec3& position, const glm::dvec2& random) {
-    LightSample sample = sample_point(light, position, random);
-    const double distance = glm::length(sample.to_light);
-    if (distance > 0.0) sample.irradiance *= spot_falloff(light, -sample.to_light / distance);
-    return sample;
-}
-
-/// A disk at infinity; its radiance is such that a surface facing its centre has irradiance S.
-LightSample sample_sun(const Light& light, const glm::dvec2& random) {
-    const double half_sine = std::sin(0.25 * light.size_x);
-    const double sagitta = 2.0 * half_sine * half_sine;
-    const glm::dvec3 direction = sample_cone(shining_back(light), sagitta, random);
-    return {direction, true, glm::dvec3(light.color) * (2.0 / (2.0 - sagitta))};
-}
-
-/// A rectangle by solid angle, where that is large enough to be computed and to matter.
-LightSample sample_area(const Light& light, const glm::dvec3& position, const glm::dvec2& random) {
-    const glm::dvec3 edge_x = light.size_x * axis(light, 0), edge_y = light.size_y * axis(light, 1);
-    const glm::dvec3 to_centre = centre(light) - position;
-    const glm::dvec3 back = shining_back(light);
-    LightSample sample{to_centre, false, glm::dvec3(0.0)};
-    if (!(glm::dot(to_centre, back) > 0.0)) return sample;
-    const glm::dvec3 power(light.color);
-
-    const double area = light.size_x * light.size_y;
-    if (light.shape == LightShape::rectangle && area > 1e-4 * glm::dot(to_centre, to_centre)) {
-        const SphericalRectangle seen(to_centre - 0.5 * (edge_x + edge_y), edge_x, edge_y);
-        sample.to_light = seen.sample(random);
-        sample.irradiance = power * (seen.solid_angle() / (pi * area));
-        return sample;
-    }
-    const glm::dvec2 place =
-        light.shape == LightShape::disk ? 0.5 * sample_disk(random) : random - 0.5;
-    sample.to_light += place.x * edge_x + place.y * edge_y;
-    const double squared = glm::dot(sample.to_light, sample.to_light);
-    sample.irradiance =
-        power * (glm::dot(sample.to_light, back) / (pi * squared * std::sqrt(squared)));
-    return sample;
-}
-
 double area_of(const Triangle& triangle) {
     const glm::dvec3 a(triangle.a);
     return 0.5 * glm::length(glm::cross(glm::dvec3(triangle.b) - a, glm::dvec3(triangle.c) - a));
 }
 
-/// Power that a light sends towards the scene, for choosing lights only. A sun shines on the disk
-/// around the scene's bounding sphere.
-double lamp_power(const Light& light, const Box& bounds) {
-    const double power = luminance(light.color);
-    const glm::dvec3 diagonal = glm::dvec3(bounds.upper) - glm::dvec3(bounds.lower);
-    switch (light.kind) {
-        case LightKind::point:
-            return power;
-        case LightKind::spot:
-            return power * 0.5 * (1.0 - std::cos(0.5 * light.spot_angle));
-        case LightKind::area:
-            return power;
-        case LightKind::sun:
-            return power * pi * 0.25 * glm::dot(diagonal, diagonal);
-    }
-    return 0.0;
+/// Power in W of a lamp other than a sun.
+double power_of(const Light& light) {
+    const double cone =
+        light.kind == LightKind::spot ? 0.5 * (1.0 - std::cos(0.5 * light.spot_angle)) : 1.0;
+    return cone * luminance(light.color);
 }
 
-void append_sum(std::vector<double>& sums, double value) {
-    sums.push_back((sums.empty() ? 0.0 : sums.back()) + value);
+double largest_of(const std::vector<double>& powers) {
+    return powers.empty() ? 0.0 : *std::max_element(powers.begin(), powers.end());
 }
 
-/// Index drawn from running sums; where they are all 0, each index is as likely.
-std::size_t choose_by_sum(const std::vector<double>& sums, double random, double& probability) {
-    const std::size_t count = sums.size();
-    if (sums.back() <= 0.0) {
-        probability = 1.0 / double(count);
-        return std::min(std::size_t(random * double(count)), count - 1);
-    }
-    const auto found = std::upper_bound(sums.begin(), sums.end(), random * sums.back());
-    const std::size_t index = std::min(std::size_t(found - sums.begin()), count - 1);
-    probability = (sums[index] - (index ? sums[index - 1] : 0.0)) / sums.back();
-    return index;
+/// Probabilities in proportion to powers. They are divided by the largest, so that float holds
+/// those of a scene of any size.
+Distribution distribution_of(const std::vector<double>& powers, double largest) {
+    Array<float> weights(powers.size());
+    for (std::size_t i = 0; i < powers.size(); ++i)
+        weights[i] = largest > 0.0 ? float(powers[i] / largest) : 0.0F;
+    return Distribution(std::move(weights));
+}
+
+/// Luminance of a material's emission, where it is looked up of the texture's mean.
+double mean_emission(const Scene& scene, const Material& material) {
+    const ColorInput& emission = material.emission;
+    if (emission.lookup == no_lookup) return luminance(emission.value);
+    const Lookup& lookup = scene.lookups[emission.lookup];
+    const glm::vec3 mean = scaled(lookup, average(*scene.textures[lookup.texture]));
+    return luminance(glm::max(mean, 0.0F));
 }
 
 }  // namespace
 
-LightSample sample_lamp(const Light& light, const glm::dvec3& position, const glm::dvec2& random) {
-    switch (light.kind) {
-        case LightKind::point:
-            return sample_point(light, position, random);
-        case LightKind::spot:
-            return sample_spot(light, position, random);
-        case LightKind::sun:
-            return sample_sun(light, random);
-        case LightKind::area:
-            return sample_area(light, position, random);
-    }
-    return {};
-}
-
 LightSampler::LightSampler(const Scene& scene) : scene_(&scene) {
-    for (std::size_t i = 0; i < scene.mesh->size(); ++i) {
-        const double radiance = luminance(scene.material(std::uint32_t(i)).emission);
-        if (radiance <= 0.0) continue;
-        const double area = area_of(scene.mesh->triangle(i));
-        if (area <= 0.0) continue;
-        emitters_.push_back(std::uint32_t(i));
-        append_sum(emitter_power_sum_, 2.0 * pi * area * radiance);
+    add_near();
+    add_distant();
+
+    // Divide the samples between the groups.
+    const bool near = near_.total() > 0.0, distant = distant_.total() > 0.0;
+    near_share_ = near ? (distant ? 0.5 : 1.0) : 0.0;
+    distant_share_ = distant ? 1.0 - near_share_ : 0.0;
+    for (double& density : emitter_density_) density *= near_share_;
+    world_probability_ *= distant_share_;
+
+    if (!scene.features.gloss) return;
+    for (std::size_t i = 0; i < lamps_.size(); ++i)
+        if (lamps_[i].has_extent())
+            extended_.push_back({lamps_[i], near_share_ * near_.probability(i)});
+    for (std::size_t i = 0; i < suns_.size(); ++i)
+        if (suns_[i].has_extent())
+            extended_.push_back({suns_[i], distant_share_ * distant_.probability(i)});
+}
+
+void LightSampler::add_near() {
+    std::vector<double> powers;
+    for (const Light& light : scene_->lights) {
+        if (light.kind == LightKind::sun || is_black(light.color)) continue;
+        lamps_.emplace_back(light);
+        powers.push_back(power_of(light));
     }
-    for (const Light& light : scene.lights)
-        append_sum(light_power_sum_, lamp_power(light, scene.mesh->bounds));
-    if (!emitters_.empty()) append_sum(light_power_sum_, emitter_power_sum_.back());
+
+    // A point on an emitting triangle is drawn with a density that follows its radiance alone.
+    for (const Material& material : scene_->materials)
+        emitter_density_.push_back(2.0 * pi * mean_emission(*scene_, material));
+    const Mesh& mesh = *scene_->mesh;
+    const auto power_of_triangle = [&](std::size_t i) {
+        return emitter_density_[scene_->material_index[i]] * area_of(mesh.triangle(i));
+    };
+    if (scene_->features.emitters)
+        emitters_ = compact(mesh.size(), Token(),
+                            [&](std::size_t i) { return power_of_triangle(i) > 0.0; });
+    for (const std::uint32_t triangle : emitters_) powers.push_back(power_of_triangle(triangle));
+
+    const double largest = largest_of(powers);
+    near_ = distribution_of(powers, largest);
+    for (double& density : emitter_density_)
+        density = density > 0.0 ? density / (largest * near_.total()) : 0.0;
 }
 
-std::size_t LightSampler::choose(double random, double& probability) const {
-    return choose_by_sum(light_power_sum_, random, probability);
+/// Suns by their irradiance, and the world by the mean of what it could bring.
+void LightSampler::add_distant() {
+    std::vector<double> powers;
+    for (const Light& light : scene_->lights) {
+        if (light.kind != LightKind::sun || is_black(light.color)) continue;
+        suns_.emplace_back(light);
+        powers.push_back(luminance(light.color));
+    }
+    double world = luminance(scene_->world.color);
+    if (scene_->features.environment) {
+        environment_.emplace(*scene_);
+        world = environment_->mean_luminance();
+    }
+    powers.push_back(pi * world);
+
+    distant_ = distribution_of(powers, largest_of(powers));
+    if (distant_.total() > 0.0) world_probability_ = distant_.probability(suns_.size());
 }
 
-LightSample LightSampler::sample(std::size_t index, const glm::dvec3& position,
+LightSample LightSampler::sample(const glm::dvec3& position, const glm::dvec3& normal,
+                                 std::uint32_t index, std::uint32_t count, double choice,
                                  const glm::dvec2& random) const {
-    if (index < scene_->lights.size()) return sample_lamp(scene_->lights[index], position, random);
-    return sample_emitters(position, random);
+    const double place = (double(index) + choice) / double(count);
+    if (place < near_share_) return sample_near(position, place / near_share_, random);
+    return sample_distant(position, normal, (place - near_share_) / distant_share_, random);
 }
 
-LightSample LightSampler::sample_emitters(const glm::dvec3& position,
-                                          const glm::dvec2& random) const {
-    // Choose a triangle by power and use what is left of the random number within its share.
-    double probability;
-    const std::size_t chosen = choose_by_sum(emitter_power_sum_, random.x, probability);
-    const double below = chosen ? emitter_power_sum_[chosen - 1] / emitter_power_sum_.back() : 0.0;
-    const double rest = std::clamp((random.x - below) / probability, 0.0, 1.0);
+LightSample LightSampler::sample_near(const glm::dvec3& position, double choice,
+                                      const glm::dvec2& random) const {
+    const std::size_t chosen = near_.choose(choice).index;
+    if (chosen >= lamps_.size())
+        return sample_emitter(position, emitters_[chosen - lamps_.size()], random);
+    return sample_lamp(lamps_[chosen], near_share_ * near_.probability(chosen), position, random);
+}
 
-    // Choose a point uniformly by area, and keep clear of the triangle itself.
-    const Triangle triangle = scene_->mesh->triangle(emitters_[chosen]);
-    const double root = std::sqrt(rest);
-    const glm::dvec3 away = glm::dvec3(triangle.a) - position;
-    const SurfacePoint point =
-        surface_point(triangle, root * (1.0 - random.y), root * random.y, away);
-    LightSample sample{glm::dvec3(offset_origin(point, point.normal)) - position, false,
-                       glm::dvec3(0.0)};
+LightSample LightSampler::sample_distant(const glm::dvec3& position, const glm::dvec3& normal,
+                                         double choice, const glm::dvec2& random) const {
+    const std::size_t chosen = distant_.choose(choice).index;
+    if (chosen == suns_.size()) return sample_world(normal, random);
+    return sample_lamp(suns_[chosen], distant_share_ * distant_.probability(chosen), position,
+                       random);
+}
 
-    const double squared = glm::dot(sample.to_light, sample.to_light);
-    const double towards = -glm::dot(sample.to_light, point.normal);
-    if (squared > 0.0 && towards > 0.0)
-        sample.irradiance =
-            glm::dvec3(scene_->material(emitters_[chosen]).emission) *
-            (area_of(triangle) * towards / (squared * std::sqrt(squared) * probability));
+LightSample LightSampler::sample_lamp(const Lamp& lamp, double probability,
+                                      const glm::dvec3& position, const glm::dvec2& random) const {
+    LightSample sample = lamp.sample(position, random);
+    sample.irradiance /= probability;
+    sample.pdf *= lamps_can_be_met() ? probability : 0.0;
     return sample;
+}
+
+/// A point uniformly by area, a little off the triangle, so that it is not in its own shadow.
+LightSample LightSampler::sample_emitter(const glm::dvec3& position, std::uint32_t triangle,
+                                         const glm::dvec2& random) const {
+    const double root = std::sqrt(random.x);
+    const double u = root * (1.0 - random.y), v = root * random.y;
+    const Triangle corners = scene_->mesh->triangle(triangle);
+    const SurfacePoint point = surface_point(corners, u, v, glm::dvec3(corners.a) - position);
+    LightSample sample{.to_light = glm::dvec3(offset_origin(point, point.normal)) - position};
+
+    const double distance = glm::length(sample.to_light);
+    const double towards = -glm::dot(sample.to_light, point.normal);
+    if (!(distance > 0.0 && towards > 0.0)) return sample;
+    sample.pdf = emitter_pdf(triangle, distance, towards / distance);
+    const glm::vec2 uv =
+        scene_->features.textures ? uv_at(*scene_, triangle, float(u), float(v)) : glm::vec2(0.0F);
+    sample.irradiance = glm::dvec3(emission(*scene_, triangle, uv)) / sample.pdf;
+    return sample;
+}
+
+double LightSampler::emitter_pdf(std::uint32_t triangle, double distance, double cosine) const {
+    const double density = emitter_density_[scene_->material_index[triangle]];
+    return density > 0.0 ? density * distance * distance / std::abs(cosine) : 0.0;
+}
+
+/// By the texture, or in proportion to the cosine where all directions are as bright.
+LightSample LightSampler::sample_world(const glm::dvec3& normal, const glm::dvec2& random) const {
+    if (environment_) {
+        const EnvironmentSample drawn = environment_->sample(random);
+        if (!(drawn.pdf > 0.0)) return {drawn.direction, true};
+        const double pdf = world_probability_ * drawn.pdf;
+        return {drawn.direction, true, glm::dvec3(drawn.radiance) / pdf, pdf};
+    }
+    const glm::dvec3 direction = sample_cosine(normal, random);
+    const double pdf = world_pdf(normal, direction);
+    if (!(pdf > 0.0)) return {direction, true};
+    return {direction, true, glm::dvec3(scene_->world.color) / pdf, pdf};
+}
+
+double LightSampler::world_pdf(const glm::dvec3& normal, const glm::dvec3& direction) const {
+    if (environment_) return world_probability_ * environment_->pdf(direction);
+    return world_probability_ * std::max(0.0, glm::dot(normal, direction)) / pi;
 }
 
 }  // namespace bvhlab

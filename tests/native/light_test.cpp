@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Lights against their closed forms, and what is refused as a scene.
+// Lights of a scene together: which is drawn, and with which density, against closed forms and
+// against rays in all directions.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
+#include <memory>
 #include <numbers>
-#include <stdexcept>
-#include <string>
 #include <vector>
 
 #include "meshes.h"
 #include "render/light_sampling.h"
+#include "render/sample_shapes.h"
 #include "render/sampler.h"
 
 namespace bvhlab {
@@ -20,31 +21,8 @@ namespace {
 using std::numbers::pi;
 
 constexpr std::uint32_t light_samples = 1 << 14;
-
-/// Irradiance at the origin on a surface with this normal, averaged over samples.
-double irradiance(const Light& light, const glm::dvec3& normal) {
-    double sum = 0.0;
-    for (std::uint32_t i = 0; i < light_samples; ++i) {
-        const LightSample sample = sample_lamp(light, glm::dvec3(0.0), Sampler(0, i, 0).pair(0));
-        const double cosine = glm::dot(normal, glm::normalize(sample.to_light));
-        sum += sample.irradiance.x * std::max(0.0, cosine);
-    }
-    return sum / light_samples;
-}
-
-/// Irradiance of a polygon of radiance 1 (Lambert): half the sum of the angles under which its
-/// edges are seen, each times the cosine of its plane. Corners counter-clockwise as seen from the
-/// origin.
-double polygon_irradiance(const std::vector<glm::dvec3>& corners, const glm::dvec3& normal) {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < corners.size(); ++i) {
-        const glm::dvec3 from = glm::normalize(corners[i]);
-        const glm::dvec3 to = glm::normalize(corners[(i + 1) % corners.size()]);
-        sum +=
-            std::acos(glm::dot(from, to)) * glm::dot(normal, glm::normalize(glm::cross(from, to)));
-    }
-    return std::abs(0.5 * sum);
-}
+const glm::dvec3 up(0, 0, 1);
+const glm::dvec3 origin(0.0);
 
 Light lamp(LightKind kind, double power, const glm::dvec3& place) {
     Light light;
@@ -54,170 +32,268 @@ Light lamp(LightKind kind, double power, const glm::dvec3& place) {
     return light;
 }
 
-const glm::dvec3 up(0, 0, 1);
-
-TEST(Lights, PointFollowsTheInverseSquare) {
-    const Light light = lamp(LightKind::point, 100, {0, 3, 4});
-    EXPECT_NEAR(irradiance(light, up), 100 / (4 * pi) / 25 * 0.8, 1e-6);
+Material emitter(float radiance) {
+    return {{}, {glm::vec3(radiance)}};
 }
 
-TEST(Lights, PointWithRadiusIsAFacingDisk) {
-    Light light = lamp(LightKind::point, 100, {0, 0, 2});
-    light.size_x = 0.5;
-    EXPECT_NEAR(irradiance(light, up), 100 / (4 * pi) / (4 + 0.25), 1e-4);
+Material gloss() {
+    Component component;
+    component.model = Model::glossy;
+    return {{component}, {}};
 }
 
-TEST(Lights, SunGivesItsStrengthAtAnyAngularSize) {
-    for (double diameter : {0.0, 0.01, 0.8}) {
-        Light light = lamp(LightKind::sun, 3, {5, 6, 7});
-        light.size_x = diameter;
-        light.to_world = glm::rotate(light.to_world, 0.5, glm::dvec3(1, 0, 0));
-        EXPECT_NEAR(irradiance(light, up), 3 * std::cos(0.5), 2e-4) << diameter;
-    }
+/// Two triangles above the origin, of which one faces it and the other does not.
+Mesh two_triangles() {
+    return make_mesh({{-1, -1, 2}, {1, -1, 2}, {1, 1, 2}, {-1, 1, 3}}, {{0, 1, 2}, {0, 3, 2}});
 }
 
-TEST(Lights, SpotMasksAPointLight) {
-    Light light = lamp(LightKind::spot, 100, {0, 0, 2});
-    light.spot_angle = 1.0;
-    EXPECT_NEAR(irradiance(light, up), 100 / (4 * pi) / 4, 1e-6);
-    light.to_world = glm::rotate(light.to_world, 0.49, glm::dvec3(1, 0, 0));
-    EXPECT_NEAR(irradiance(light, up), 100 / (4 * pi) / 4, 1e-6);
-    light.to_world = glm::rotate(light.to_world, 0.02, glm::dvec3(1, 0, 0));
-    EXPECT_EQ(irradiance(light, up), 0.0);
+/// A scene of two_triangles() with these materials.
+SceneParts parts(Material first, Material second) {
+    SceneParts parts;
+    parts.mesh = test::shared(two_triangles());
+    parts.materials = {std::move(first), std::move(second)};
+    parts.material_index = {0, 1};
+    return parts;
 }
 
-TEST(Lights, SpotBlendIsHalfInTheMiddleOfItsCosines) {
-    Light light = lamp(LightKind::spot, 100, {0, 0, 2});
-    light.spot_angle = 1.0;
-    light.spot_blend = 0.5;
-    const double edge = std::cos(0.5);
-    const double middle = std::acos(edge + 0.25 * (1.0 - edge));
-    light.to_world = glm::rotate(light.to_world, middle, glm::dvec3(1, 0, 0));
-    EXPECT_NEAR(irradiance(light, up), 0.5 * 100 / (4 * pi) / 4, 1e-6);
+LightSample draw(const LightSampler& lights, std::uint32_t i, std::uint32_t index = 0,
+                 std::uint32_t count = 1) {
+    const Sampler random(0, i, 0);
+    return lights.sample(origin, up, index, count, random.pair(1).x, random.pair(0));
 }
 
-TEST(Lights, DiskHasItsFormFactor) {
-    Light light = lamp(LightKind::area, 100, {0, 0, 2});
-    light.shape = LightShape::disk;
-    light.size_x = light.size_y = 3.0;  // of diameter
-    const double radiance = 100 / (pi * pi * 2.25);
-    EXPECT_NEAR(irradiance(light, up), pi * radiance * 2.25 / (2.25 + 4), 5e-3);
+double cosine(const LightSample& sample) {
+    return std::max(0.0, glm::dot(up, glm::normalize(sample.to_light)));
 }
 
-TEST(Lights, RectangleHasItsFormFactorAndShinesForwardOnly) {
-    Light light = lamp(LightKind::area, 100, {0.5, 0.2, 2});
-    light.to_world = glm::rotate(light.to_world, 0.4, glm::dvec3(0, 1, 0));
-    light.size_x = 2.0;
-    light.size_y = 1.0;
-    std::vector<glm::dvec3> corners;
-    for (const glm::dvec2 place : {glm::dvec2(-1, -0.5), {1, -0.5}, {1, 0.5}, {-1, 0.5}})
-        corners.emplace_back(light.to_world * glm::dvec4(place, 0.0, 1.0));
-    const double expected = 100 / (2 * pi) * polygon_irradiance(corners, up);
-    EXPECT_NEAR(irradiance(light, up), expected, 1e-3 * expected);
-    light.to_world = glm::rotate(light.to_world, pi, glm::dvec3(0, 1, 0));
-    EXPECT_EQ(irradiance(light, up), 0.0);
-}
-
-TEST(Lights, RectangleIsDrawnBySolidAngle) {
-    // Directly above the middle of a large lamp, every sample counts the same; from anywhere,
-    // points lie on the lamp and the mean of the directions by area agrees with that by solid
-    // angle.
-    Light light = lamp(LightKind::area, 1, {0, 0, 0.01});
-    light.size_x = 4.0;
-    light.size_y = 2.0;
-    for (std::uint32_t i = 0; i < 256; ++i) {
-        const LightSample sample = sample_lamp(light, {0, 0, 0}, Sampler(0, i, 0).pair(0));
-        EXPECT_NEAR(sample.irradiance.x, 2 * pi / (8 * pi), 0.01);
-        EXPECT_LE(std::abs(sample.to_light.x), 2.0);
-        EXPECT_LE(std::abs(sample.to_light.y), 1.0);
-        EXPECT_NEAR(sample.to_light.z, 0.01, 1e-12);
-    }
-    for (const glm::dvec3& position : {glm::dvec3(3, 0.5, -1), glm::dvec3(-1, -5, -3)}) {
-        glm::dvec3 by_angle(0.0), by_area(0.0);
-        for (std::uint32_t i = 0; i < light_samples; ++i) {
-            const glm::dvec2 random = Sampler(0, i, 0).pair(0);
-            const LightSample sample = sample_lamp(light, position, random);
-            by_angle += sample.irradiance.x * glm::normalize(sample.to_light);
-            const glm::dvec3 to_point =
-                glm::dvec3((random.x - 0.5) * 4, (random.y - 0.5) * 2, 0.01) - position;
-            const double distance = glm::length(to_point);
-            by_area += to_point * (to_point.z / (pi * std::pow(distance, 4)));
-        }
-        EXPECT_NEAR(glm::length(by_angle - by_area) / glm::length(by_area), 0.0, 1e-3);
-    }
-}
-
-Scene scene_of(Mesh mesh, std::vector<Material> materials, std::vector<Light> lights) {
-    Array<std::uint32_t> index(mesh.size());
-    for (std::size_t i = 0; i < index.size(); ++i) index[i] = std::uint32_t(i % materials.size());
-    return make_scene(test::shared(std::move(mesh)), std::move(materials), std::move(index),
-                      std::move(lights), glm::vec3(0.0F));
-}
-
-TEST(Lights, EmittingTrianglesHaveTheirFormFactorFromBothSides) {
-    const Mesh mesh =
-        make_mesh({{-1, -1, 2}, {1, -1, 2}, {1, 1, 2}, {-1, 1, 3}}, {{0, 1, 2}, {0, 2, 3}});
-    const Scene scene = scene_of(mesh, {{glm::vec3(0.5F), glm::vec3(2.0F)}}, {});
-    const LightSampler lights(scene);
-    ASSERT_EQ(lights.size(), 1U);
+/// Unshadowed irradiance at the origin with `count` samples in a set.
+double irradiance(const LightSampler& lights, std::uint32_t count) {
     double sum = 0.0;
-    for (std::uint32_t i = 0; i < light_samples; ++i) {
-        const LightSample sample = lights.sample(0, glm::dvec3(0.0), Sampler(0, i, 0).pair(0));
-        sum += sample.irradiance.x * sample.to_light.z / glm::length(sample.to_light);
+    for (std::uint32_t i = 0; i < light_samples; ++i)
+        for (std::uint32_t index = 0; index < count; ++index) {
+            const LightSample sample = draw(lights, i, index, count);
+            sum += sample.irradiance.x * cosine(sample);
+        }
+    return sum / (double(light_samples) * count);
+}
+
+/// Whether the triangle, alone in space, is met by a ray from the origin.
+bool meets(const Triangle& triangle, const glm::dvec3& direction, double& distance, double& u,
+           double& v) {
+    const glm::dvec3 a(triangle.a), side(triangle.b - triangle.a), other(triangle.c - triangle.a);
+    const glm::dvec3 p = glm::cross(direction, other);
+    const double determinant = glm::dot(side, p);
+    u = -glm::dot(a, p) / determinant;
+    const glm::dvec3 q = glm::cross(-a, side);
+    v = glm::dot(direction, q) / determinant;
+    distance = glm::dot(other, q) / determinant;
+    return u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0;
+}
+
+double facing(const Triangle& triangle, const glm::dvec3& direction) {
+    return glm::dot(
+        glm::normalize(glm::dvec3(glm::cross(triangle.b - triangle.a, triangle.c - triangle.a))),
+        direction);
+}
+
+/// All light from everywhere, in directions of the upper half, and the density with which light
+/// samples find them.
+struct Sky {
+    double irradiance = 0.0, density = 0.0;
+};
+
+Sky look_everywhere(const Scene& scene, const LightSampler& lights, std::uint32_t directions) {
+    Sky sky;
+    const double solid_angle = 2.0 * pi / directions;
+    for (std::uint32_t i = 0; i < directions; ++i) {
+        const glm::dvec3 direction = sample_cone(up, 1.0, Sampler(0, i, 0).pair(0));
+        double radiance = double(lights.world_radiance(direction).x);
+        double density = lights.world_pdf(up, direction);
+        for (std::uint32_t triangle = 0; triangle < scene.mesh->size(); ++triangle) {
+            double distance, u, v;
+            const Triangle corners = scene.mesh->triangle(triangle);
+            if (!meets(corners, direction, distance, u, v)) continue;
+            radiance += double(scene.material(triangle).emission.value.x);
+            density += lights.emitter_pdf(triangle, distance, facing(corners, direction));
+        }
+        lights.for_lamps_met(origin, direction, 0.0, std::numeric_limits<double>::infinity(),
+                             [&](const LampHit& hit) {
+                                 radiance += hit.radiance.x;
+                                 density += hit.pdf;
+                             });
+        sky.irradiance += radiance * direction.z * solid_angle;
+        sky.density += density * solid_angle;
     }
-    double expected = 0.0;
-    for (std::size_t i = 0; i < 2; ++i) {
-        const Triangle t = mesh.triangle(i);
-        expected +=
-            2.0 * polygon_irradiance({glm::dvec3(t.a), glm::dvec3(t.b), glm::dvec3(t.c)}, up);
+    return sky;
+}
+
+std::vector<Light> lamps_with_extent() {
+    Light point = lamp(LightKind::point, 100, {1, 0.5, 2});
+    point.size_x = 0.6;
+    Light sun = lamp(LightKind::sun, 3, {0, 0, 0});
+    sun.size_x = 0.5;
+    sun.to_world = glm::rotate(sun.to_world, 0.6, glm::dvec3(0, 1, 0));
+    Light area = lamp(LightKind::area, 40, {-1, 1, 1.5});
+    area.size_x = 1.5;
+    area.size_y = 1.0;
+    return {point, sun, area};
+}
+
+TEST(Lights, AllTogetherBringWhatRaysInAllDirectionsFind) {
+    SceneParts given = parts(emitter(5), emitter(1));
+    given.materials[1].components = gloss().components;  // without which lamps are not met
+    given.lights = lamps_with_extent();
+    given.world.color = glm::vec3(0.7F);
+    const Scene scene = make_scene(given);
+    const LightSampler lights(scene);
+    ASSERT_TRUE(lights.lamps_can_be_met());
+    const Sky sky = look_everywhere(scene, lights, 1 << 17);
+    EXPECT_NEAR(sky.density, 1.0, 2e-3);
+    for (const std::uint32_t count : {1U, 2U, 3U})
+        EXPECT_NEAR(irradiance(lights, count), sky.irradiance, 4e-3 * sky.irradiance) << count;
+}
+
+TEST(Lights, DensitiesOfDrawnDirectionsAreThoseOfMetOnes) {
+    SceneParts given = parts(emitter(5), emitter(1));
+    given.world.color = glm::vec3(0.7F);
+    const Scene scene = make_scene(given);
+    const LightSampler lights(scene);
+    int near = 0;
+    for (std::uint32_t i = 0; i < 256; ++i) {
+        const LightSample sample = draw(lights, i);
+        const glm::dvec3 direction = glm::normalize(sample.to_light);
+        if (sample.distant) {
+            EXPECT_NEAR(sample.pdf, lights.world_pdf(up, direction), 1e-9 * sample.pdf);
+            continue;
+        }
+        ++near;
+        double found = 0.0;
+        for (std::uint32_t triangle = 0; triangle < 2; ++triangle) {
+            double distance, u, v;
+            const Triangle corners = scene.mesh->triangle(triangle);
+            // Both may be met, of which the sample is on one.
+            if (!meets(corners, direction, distance, u, v)) continue;
+            if (std::abs(distance - glm::length(sample.to_light)) > 1e-4) continue;
+            found = lights.emitter_pdf(triangle, distance, facing(corners, direction));
+        }
+        EXPECT_NEAR(found, sample.pdf, 1e-4 * sample.pdf);
     }
-    EXPECT_NEAR(sum / light_samples, expected, 2e-3 * expected);
+    EXPECT_EQ(near, 128);
+}
+
+TEST(Lights, TwoSamplesAreOneOfEachGroup) {
+    SceneParts given = parts(emitter(5), Material{});
+    given.lights = lamps_with_extent();
+    given.world.color = glm::vec3(0.01F);
+    const Scene scene = make_scene(given);
+    const LightSampler lights(scene);
+    for (std::uint32_t i = 0; i < 64; ++i) {
+        EXPECT_FALSE(draw(lights, i, 0, 2).distant);
+        EXPECT_TRUE(draw(lights, i, 1, 2).distant);
+    }
 }
 
 TEST(Lights, ChoiceFollowsPower) {
-    const Scene scene =
-        scene_of(test::copies(1), {Material{}},
-                 {lamp(LightKind::point, 10, {0, 0, 1}), lamp(LightKind::point, 0, {0, 0, 1}),
-                  lamp(LightKind::area, 30, {0, 0, 1})});
-    const LightSampler lights(scene);
-    double probability;
-    EXPECT_EQ(lights.choose(0.0, probability), 0U);
-    EXPECT_NEAR(probability, 0.25, 1e-12);
-    EXPECT_EQ(lights.choose(0.2499, probability), 0U);
-    EXPECT_EQ(lights.choose(0.25, probability), 2U);
-    EXPECT_NEAR(probability, 0.75, 1e-12);
-    EXPECT_EQ(lights.choose(0.99999999, probability), 2U);
-}
-
-TEST(Lights, DarkLampsAreStillChosen) {
-    const Scene scene =
-        scene_of(test::copies(1), {Material{}},
-                 {lamp(LightKind::point, 0, {0, 0, 1}), lamp(LightKind::point, 0, {0, 0, 1})});
-    double probability;
-    EXPECT_EQ(LightSampler(scene).choose(0.7, probability), 1U);
-    EXPECT_EQ(probability, 0.5);
-}
-
-TEST(Scene, BadPartsAreNamed) {
-    const auto mesh = test::shared(test::copies(3));
-    const auto complaint = [&](Material material, Array<std::uint32_t> index, Light light) {
-        try {
-            make_scene(mesh, {material}, std::move(index), {light}, glm::vec3(0.0F));
-        } catch (const std::invalid_argument& error) {
-            return std::string(error.what());
-        }
-        return std::string();
+    const auto share_of_second = [](std::vector<Light> lights) {
+        SceneParts given = parts(Material{}, Material{});
+        given.lights = std::move(lights);
+        const Scene scene = make_scene(given);
+        const LightSampler sampler(scene);
+        int second = 0;
+        for (std::uint32_t i = 0; i < 1024; ++i)
+            second += sampler.sample(origin, up, 0, 1, i / 1024.0, {0.5, 0.5}).to_light.x == 2.0;
+        return second / 1024.0;
     };
-    const Light good = lamp(LightKind::point, 1, {0, 0, 0});
-    EXPECT_EQ(complaint({}, {0, 0, 0}, good), "");
-    EXPECT_EQ(complaint({}, {0, 0, 1}, good),
-              "triangle 2 has material 1, but there are only 1 materials");
-    EXPECT_EQ(complaint({}, {0, 0}, good), "material_index has 2 entries for 3 triangles");
-    EXPECT_NE(complaint({glm::vec3(2.0F), {}}, {0, 0, 0}, good).find("material 0 has base_color"),
-              std::string::npos);
-    Light bad = good;
-    bad.color.y = -1.0F;
-    EXPECT_EQ(complaint({}, {0, 0, 0}, bad).find("light 0: the light's color"), 0U);
+    const Light point = lamp(LightKind::point, 10, {1, 0, 1});
+    EXPECT_NEAR(share_of_second({point, lamp(LightKind::point, 30, {2, 0, 1})}), 0.75, 2e-3);
+    Light area = lamp(LightKind::area, 30, {2, 0, 1});
+    area.size_x = area.size_y = 1e-9;
+    EXPECT_GT(share_of_second({point, area}), 0.0);
+    Light spot = lamp(LightKind::spot, 30, {2, 0, 1});
+    spot.spot_angle = 2.0 * pi / 3.0;  // a quarter of the sphere
+    EXPECT_NEAR(share_of_second({point, spot}), 7.5 / 17.5, 2e-3);
+    EXPECT_EQ(share_of_second({point, lamp(LightKind::point, 0, {2, 0, 1})}), 0.0);
+}
+
+TEST(Lights, WhereNothingShinesThereIsNothingToSample) {
+    SceneParts given = parts(Material{}, emitter(0));
+    given.lights = {lamp(LightKind::point, 0, {0, 0, 1}), lamp(LightKind::sun, 0, {0, 0, 1})};
+    EXPECT_TRUE(LightSampler(make_scene(given)).empty());
+    given.lights.push_back(lamp(LightKind::sun, 1, {0, 0, 1}));
+    EXPECT_FALSE(LightSampler(make_scene(given)).empty());
+}
+
+TEST(Lights, LampsAreMetOnlyWhereSomethingIsGlossy) {
+    SceneParts given = parts(Material{}, Material{});
+    given.lights = lamps_with_extent();
+    const Scene matte = make_scene(given);
+    EXPECT_FALSE(LightSampler(matte).lamps_can_be_met());
+    EXPECT_EQ(draw(LightSampler(matte), 0).pdf, 0.0);
+    given.materials[1] = gloss();
+    const Scene glossy = make_scene(given);
+    EXPECT_TRUE(LightSampler(glossy).lamps_can_be_met());
+    EXPECT_GT(draw(LightSampler(glossy), 0).pdf, 0.0);
+}
+
+TEST(Lights, TinyAndHugeScenesHaveTheSameIrradiance) {
+    double expected = 0.0;
+    for (const float scale : {1.0F, 1e-6F, 1e6F}) {
+        SceneParts given = parts(emitter(5), emitter(1));
+        given.mesh = test::shared(test::scaled(two_triangles(), scale));
+        const Scene scene = make_scene(given);
+        const double found = irradiance(LightSampler(scene), 1);
+        if (scale == 1.0F) expected = found;
+        EXPECT_NEAR(found, expected, 1e-5 * expected) << scale;
+    }
+}
+
+TEST(Lights, TexturedEmissionIsLookedUpAtThePoint) {
+    auto texture = std::make_shared<Texture>();
+    texture->width = texture->height = 2;
+    texture->channels = 1;
+    texture->closest = true;
+    texture->floats = {8.0F, 0.0F, 0.5F, 1.0F};
+    SceneParts given = parts(emitter(0), emitter(0));
+    given.materials[0].emission.lookup = 0;
+    given.lookups.push_back({.texture = 0, .scale = glm::vec3(2.0F)});
+    given.textures.push_back(texture);
+    given.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 0}, {1, 0}, {1, 1}};
+    const Scene scene = make_scene(given);
+    const LightSampler lights(scene);
+    double expected = 0.0;
+    constexpr std::uint32_t directions = 1 << 17;
+    for (std::uint32_t i = 0; i < directions; ++i) {
+        const glm::dvec3 direction = sample_cone(up, 1.0, Sampler(0, i, 0).pair(0));
+        double distance, u, v;
+        if (!meets(scene.mesh->triangle(0), direction, distance, u, v)) continue;
+        const glm::vec2 uv(u + v, v);
+        expected += 2.0 * double(look_up(*texture, uv).x) * direction.z * 2.0 * pi / directions;
+    }
+    EXPECT_NEAR(irradiance(lights, 1), expected, 5e-3 * expected);
+    EXPECT_EQ(lights.emitter_pdf(1, 2.0, 1.0), 0.0);
+}
+
+TEST(Lights, ManyEmittersAreDrawnByPower) {
+    SceneParts given;
+    given.mesh = test::shared(test::random_soup(20000));
+    given.materials = {Material{}, emitter(2), emitter(6)};
+    given.material_index = Array<std::uint32_t>(20000, 0);
+    glm::dvec3 centre(0.0);
+    double power = 0.0;
+    for (std::uint32_t i = 0; i < 20000; ++i) {
+        given.material_index[i] = i % 3;
+        const Triangle t = given.mesh->triangle(i);
+        const double weight = double(glm::length(glm::cross(t.b - t.a, t.c - t.a))) *
+                              double(given.materials[i % 3].emission.value.x);
+        centre += weight * glm::dvec3(t.a + t.b + t.c) / 3.0;
+        power += weight;
+    }
+    const Scene scene = make_scene(given);
+    const LightSampler lights(scene);
+    glm::dvec3 found(0.0);
+    for (std::uint32_t i = 0; i < light_samples; ++i)
+        found += draw(lights, i).to_light / double(light_samples);
+    EXPECT_LT(glm::length(found - centre / power), 0.01);
 }
 
 }  // namespace
