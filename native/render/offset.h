@@ -16,6 +16,7 @@ struct SurfacePoint {
     glm::dvec3 position;  ///< on the original triangle
     glm::dvec3 normal;    ///< geometric, unit length, on the side that the ray came from
     double clearance;     ///< distance along the normal that new origins keep, see surface_point()
+    bool inside;          ///< the ray came from where the winding is clockwise
 };
 
 /// The hit point from barycentrics, in double.
@@ -39,7 +40,8 @@ inline SurfacePoint surface_point(const Triangle& triangle, double u, double v,
     const glm::dvec3 cross = glm::cross(b - a, c - a);
     const double length = glm::length(cross);
     point.normal = length > 0.0 ? cross / length : -glm::normalize(ray_direction);
-    if (glm::dot(point.normal, ray_direction) > 0.0) point.normal = -point.normal;
+    point.inside = glm::dot(point.normal, ray_direction) > 0.0;
+    if (point.inside) point.normal = -point.normal;
 
     double largest = 0.0;
     for (const glm::dvec3& corner : {a, b, c}) {

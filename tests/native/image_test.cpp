@@ -13,6 +13,8 @@
 #include <vector>
 
 #include "image/compare.h"
+#include "image/error.h"
+#include "image/flip.h"
 #include "image/write.h"
 
 namespace bvhlab {
@@ -213,6 +215,131 @@ TEST_F(Image, NotANumberIsADifference) {
 TEST_F(Image, DifferentSizesCannotBeCompared) {
     EXPECT_THROW(compare_images(view_, {values_.data(), 4, 1, 3}), std::invalid_argument);
     EXPECT_THROW(compare_images(view_, {values_.data(), 4, 3, 1}), std::invalid_argument);
+}
+
+// --- the error of a noisy picture ----------------------------------------------------------------
+
+/// A grey or colour picture that holds its values.
+struct Held {
+    std::vector<float> values;
+    int width, height, channels;
+    operator ImageView() const { return {values.data(), width, height, channels}; }
+};
+
+Held filled(const std::vector<float>& colour, int width = 20, int height = 10) {
+    Held image{{}, width, height, int(colour.size())};
+    for (int i = 0; i < width * height; ++i)
+        image.values.insert(image.values.end(), colour.begin(), colour.end());
+    return image;
+}
+
+TEST(ImageError, IsZeroForEqualPictures) {
+    const Held image = filled({0.3F, 2.0F, 0.0F});
+    const ImageError error = image_error(image, image);
+    EXPECT_EQ(error.relative_mse, 0.0);
+    EXPECT_EQ(error.mean_absolute, 0.0);
+    EXPECT_EQ(error.root_mean_square, 0.0);
+    EXPECT_EQ(error.peak_signal_to_noise, std::numeric_limits<double>::infinity());
+    EXPECT_EQ(error.flip, 0.0);
+    EXPECT_EQ(error.bias, 0.0);
+}
+
+TEST(ImageError, HasTheValuesOfItsFormulas) {
+    const Held reference{{0.0F, 1.0F, 2.0F, 5.0F}, 2, 2, 1};  // mean 2: 0.01 m^2 is 0.04
+    const Held picture{{0.5F, 1.0F, 1.0F, 6.0F}, 2, 2, 1};
+    const ImageError error = image_error(picture, reference);
+    EXPECT_NEAR(error.relative_mse, (0.25 / 0.04 + 1.0 / 4.04 + 1.0 / 25.04) / 4.0, 1e-12);
+    EXPECT_NEAR(error.mean_absolute, 2.5 / 4.0, 1e-12);
+    EXPECT_NEAR(error.root_mean_square, std::sqrt(2.25 / 4.0), 1e-12);
+    EXPECT_NEAR(error.peak_signal_to_noise, 10.0 * std::log10(25.0 / (2.25 / 4.0)), 1e-12);
+    EXPECT_NEAR(error.bias, 0.5 / 4.0 / 2.0, 1e-12);
+}
+
+TEST(ImageError, DoesNotDependOnTheUnitOfRadiance) {
+    Held reference = filled({0.2F, 1.0F, 3.0F}), picture = filled({0.3F, 0.9F, 2.0F});
+    const ImageError before = image_error(picture, reference);
+    for (Held* image : {&reference, &picture})
+        for (float& value : image->values) value = std::ldexp(value, 60);
+    const ImageError after = image_error(picture, reference);
+    EXPECT_DOUBLE_EQ(after.relative_mse, before.relative_mse);
+    EXPECT_DOUBLE_EQ(after.peak_signal_to_noise, before.peak_signal_to_noise);
+    EXPECT_DOUBLE_EQ(after.flip, before.flip);
+    EXPECT_DOUBLE_EQ(after.bias, before.bias);
+    EXPECT_DOUBLE_EQ(after.mean_absolute, std::ldexp(before.mean_absolute, 60));
+}
+
+TEST(ImageError, HidesNoValueThatIsNotFinite) {
+    const Held reference = filled({1.0F, 1.0F, 1.0F});
+    for (const float bad : {std::nanf(""), std::numeric_limits<float>::infinity()}) {
+        Held picture = reference;
+        picture.values[7] = bad;
+        const ImageError error = image_error(picture, reference);
+        EXPECT_EQ(error.non_finite, 1U);
+        for (const double value : {error.relative_mse, error.mean_absolute, error.root_mean_square,
+                                   error.flip, error.bias, -error.peak_signal_to_noise})
+            EXPECT_EQ(value, std::numeric_limits<double>::infinity());
+    }
+}
+
+TEST(ImageError, JudgesAgainstBlack) {
+    const Held black = filled({0.0F}), grey = filled({0.5F});
+    EXPECT_EQ(image_error(black, black).relative_mse, 0.0);
+    EXPECT_EQ(image_error(black, black).bias, 0.0);
+    EXPECT_EQ(image_error(grey, black).relative_mse, std::numeric_limits<double>::infinity());
+    EXPECT_EQ(image_error(grey, black).peak_signal_to_noise,
+              -std::numeric_limits<double>::infinity());
+    const Held white = filled({1.0F, 1.0F, 1.0F}), dark = filled({0.0F, 0.0F, 0.0F});
+    EXPECT_NEAR(image_error(grey, black).flip, flip_map(white, dark)[0], 1e-6);
+}
+
+TEST(ImageError, NamesWhatItCannotJudge) {
+    Held reference = filled({1.0F, 1.0F, 1.0F});
+    const Held picture = reference;
+    EXPECT_THROW(image_error(picture, filled({1.0F, 1.0F, 1.0F}, 10, 20)), std::invalid_argument);
+    const Held with_alpha = filled({1.0F, 1.0F, 1.0F, 1.0F});
+    EXPECT_THROW(image_error(with_alpha, with_alpha), std::invalid_argument);
+    reference.values[(3 * 20 + 5) * 3 + 1] = -1.0F;
+    try {
+        image_error(picture, reference);
+        FAIL() << "a negative reference was accepted";
+    } catch (const std::invalid_argument& error) {
+        EXPECT_NE(std::string(error.what()).find("(5, 3) is -1"), std::string::npos)
+            << error.what();
+    }
+}
+
+/// Colours that fill the picture leave nothing to blur and no edges: FLIP is the distance of the
+/// two colours. Black and white have L* 0 and 100 and no chroma; green and blue are farthest apart.
+TEST(Flip, OfUniformColoursIsTheirDistance) {
+    const auto flip = [](const std::vector<float>& a, const std::vector<float>& b) {
+        const Held first = filled(a), second = filled(b);
+        const Array<float> map = flip_map(first, second);
+        for (const float value : map) EXPECT_NEAR(value, map[0], 1e-5F);
+        return map[0];
+    };
+    const std::vector<float> green{0.0F, 1.0F, 0.0F}, blue{0.0F, 0.0F, 1.0F};
+    EXPECT_NEAR(flip(green, blue), 1.0F, 1e-4F);
+    EXPECT_EQ(flip(green, green), 0.0F);
+    EXPECT_NEAR(flip(blue, green), flip(green, blue), 1e-6F);
+    // HyAB with the Hunt effect, worked out by hand from L*a*b* of green (87.735, -86.183, 83.180)
+    // and blue (32.299, 79.188, -107.860).
+    const double most =
+        std::pow((87.735 - 32.299) + std::hypot(0.01 * (87.735 * -86.183 - 32.299 * 79.188),
+                                                0.01 * (87.735 * 83.180 + 32.299 * 107.860)),
+                 0.7);
+    const double bend = 0.4 * most, white = std::pow(100.0, 0.7);
+    EXPECT_NEAR(flip({0.0F, 0.0F, 0.0F}, {1.0F, 1.0F, 1.0F}),
+                0.95 + 0.05 * (white - bend) / (most - bend), 1e-4);
+}
+
+TEST(Flip, SeesALineMoreThanTheSameLightSpreadOut) {
+    Held black = filled({0.0F, 0.0F, 0.0F}, 64, 64), line = black, haze = black;
+    for (int y = 0; y < 64; ++y)
+        for (int i = 0; i < 3; ++i) line.values[std::size_t((y * 64 + 32) * 3 + i)] = 0.64F;
+    for (float& value : haze.values) value = 0.01F;
+    const Array<float> sharp = flip_map(line, black), soft = flip_map(haze, black);
+    EXPECT_GT(sharp[32 * 64 + 32], 3.0F * soft[32 * 64 + 32]);
+    EXPECT_EQ(sharp[32 * 64], 0.0F);  // far from the line there is nothing
 }
 
 }  // namespace

@@ -1,20 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The parts of rendering, each against its closed form: sampler, camera rays, ray offset.
+// The parts of rendering, each against its closed form: sampler, shapes, ray offset.
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/gtc/matrix_transform.hpp>
-#include <numbers>
 #include <set>
-#include <stdexcept>
-#include <string>
-#include <vector>
 
 #include "meshes.h"
-#include "render/camera_rays.h"
-#include "render/light_sampling.h"
 #include "render/offset.h"
 #include "render/sample_shapes.h"
 #include "render/sampler.h"
@@ -22,8 +14,6 @@
 
 namespace bvhlab {
 namespace {
-
-using std::numbers::pi;
 
 // --- sampler -------------------------------------------------------------------------------------
 
@@ -88,90 +78,6 @@ TEST(SampleShapes, BasisIsOrthonormalEverywhere) {
         for (int i = 0; i < 3; ++i) EXPECT_NEAR(glm::length(basis[i]), 1.0, 1e-12);
         EXPECT_EQ(basis[2], axis);
     }
-}
-
-// --- camera rays ---------------------------------------------------------------------------------
-
-void expect_near(const glm::vec3& value, const glm::dvec3& expected, double tolerance = 1e-6) {
-    for (int axis = 0; axis < 3; ++axis)
-        EXPECT_NEAR(double(value[axis]), expected[axis], tolerance) << "axis " << axis;
-}
-
-TEST(CameraRays, PerspectiveCornersAreRowMajorFromTheTopLeft) {
-    Camera camera;
-    camera.left = -2.0;
-    camera.right = 2.0;
-    camera.clip_start = 0.25;
-    const Raster raster{4, 2};
-    const RayArrays rays = camera_rays(camera, raster, 0, 1, Token());
-    ASSERT_EQ(rays.origins.size(), 8U);
-    const std::array<glm::dvec3, 2> through{glm::dvec3(-1.5, 0.5, -1), glm::dvec3(1.5, -0.5, -1)};
-    expect_near(rays.directions.front(), glm::normalize(through[0]));
-    expect_near(rays.directions.back(), glm::normalize(through[1]));
-    expect_near(rays.origins.front(), 0.25 * through[0]);
-    expect_near(rays.origins.back(), 0.25 * through[1]);
-}
-
-TEST(CameraRays, OrthographicRaysAreParallelFromTheNearPlane) {
-    Camera camera;
-    camera.kind = CameraKind::orthographic;
-    camera.to_world = glm::translate(glm::dmat4(1.0), glm::dvec3(10, 20, 30));
-    camera.left = -2.0;
-    camera.right = 2.0;
-    camera.clip_start = 0.5;
-    const RayArrays rays = camera_rays(camera, {4, 2}, 0, 1, Token());
-    expect_near(rays.origins.front(), {8.5, 20.5, 29.5});
-    expect_near(rays.origins.back(), {11.5, 19.5, 29.5});
-    for (const glm::vec3& direction : rays.directions) EXPECT_EQ(direction, glm::vec3(0, 0, -1));
-}
-
-TEST(CameraRays, MatrixTurnsTheView) {
-    Camera camera;
-    camera.to_world = glm::rotate(glm::dmat4(1.0), pi / 2, glm::dvec3(1, 0, 0));
-    const RayArrays rays = camera_rays(camera, {1, 1}, 0, 1, Token());
-    expect_near(rays.directions[0], {0, 1, 0});
-}
-
-TEST(CameraRays, FurtherSamplesStayInTheirPixelAndSpreadOverIt) {
-    Camera camera;
-    camera.kind = CameraKind::orthographic;
-    camera.left = camera.bottom = 0.0;
-    camera.right = camera.top = 4.0;
-    std::set<int> cells;
-    for (std::uint32_t sample = 1; sample < 65; ++sample) {
-        const CameraRay ray = camera_ray(camera, {4, 4, 5}, 6, sample);  // third column, second row
-        EXPECT_GE(ray.origin.x, 2.0F);
-        EXPECT_LE(ray.origin.x, 3.0F);
-        EXPECT_GE(ray.origin.y, 2.0F);
-        EXPECT_LE(ray.origin.y, 3.0F);
-        cells.insert(int((ray.origin.x - 2.0F) * 4) * 4 + int((ray.origin.y - 2.0F) * 4));
-    }
-    EXPECT_EQ(cells.size(), 16U);
-}
-
-std::string camera_complaint(const Camera& camera) {
-    try {
-        check_camera(camera);
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "";
-}
-
-TEST(CameraRays, BadCamerasAreNamed) {
-    EXPECT_EQ(camera_complaint({}), "");
-    Camera camera;
-    camera.right = camera.left;
-    EXPECT_NE(camera_complaint(camera).find("window"), std::string::npos);
-    camera = {};
-    camera.clip_start = -1.0;
-    EXPECT_NE(camera_complaint(camera).find("clip_start"), std::string::npos);
-    camera = {};
-    camera.to_world[0] *= 2.0;
-    EXPECT_NE(camera_complaint(camera).find("scale"), std::string::npos);
-    camera = {};
-    camera.to_world[3][1] = std::nan("");
-    EXPECT_NE(camera_complaint(camera).find("to_world"), std::string::npos);
 }
 
 // --- offset --------------------------------------------------------------------------------------
