@@ -9,16 +9,18 @@ from typing import Literal
 import bpy
 
 from ..study.framing import auto_cameras
-from ..study.scene import Scene
+from ..study.scene import Scene, World
 from .cameras import read_cameras
 from .geometry import ExtractError, Geometry, gather
-from .lights import read_lights, read_world
-from .materials import read_material
+from .lights import read_lights
+from .materials import Materials
 from .notes import Notes
 from .render_geometry import with_render_depsgraph
+from .textures import Textures
+from .world import read_world
 
-__all__ = ["ExtractError", "extract_scene"]
-WHITE = (1.0, 1.0, 1.0)
+__all__ = ["ExtractError", "extract_as_is", "extract_scene"]
+WHITE = World((1.0, 1.0, 1.0))
 
 
 def extract_scene(
@@ -40,14 +42,27 @@ def extract_scene(
     return _extract(scene, name, context.evaluated_depsgraph_get(), "viewport")
 
 
+def extract_as_is(depsgraph: bpy.types.Depsgraph, geometry: Literal["viewport", "render"]) -> Scene:
+    """As `extract_scene`, of the dependency graph that a render engine is given.
+
+    Neither a camera nor light is added where the scene has none. In the calling thread.
+    """
+    return _extract(
+        depsgraph.scene, _scene_name(depsgraph.scene), depsgraph, geometry, fill_in=False
+    )
+
+
 def _extract(
     scene: bpy.types.Scene,
     name: str,
     depsgraph: bpy.types.Depsgraph,
     geometry: Literal["viewport", "render"],
+    fill_in: bool = True,
 ) -> Scene:
     notes = Notes()
-    found = gather(depsgraph, geometry == "viewport", notes)
+    textures = Textures(notes)
+    materials = Materials(textures, notes)
+    found = gather(depsgraph, geometry == "viewport", materials, notes)
     if len(found.triangles) == 0:
         visible = "renderable" if geometry == "render" else "visible"
         raise ExtractError(
@@ -55,30 +70,35 @@ def _extract(
         )
     _say_geometry(found, geometry, notes)
     cameras = read_cameras(scene, depsgraph, notes)
-    if not cameras:
+    if not cameras and fill_in:
         cameras = auto_cameras(found.vertices)
         notes.fact(f"no camera in the scene: added {len(cameras)} that frame it")
-    materials = [read_material(material, notes) for material in found.materials]
-    lights = read_lights(depsgraph, notes)
+    lights = read_lights(depsgraph, textures, notes)
     world = scene.world.evaluated_get(depsgraph) if scene.world else None
-    radiance = read_world(world, notes)
-    if not lights and not any(max(material.emission) > 0.0 for material in materials):
-        radiance = WHITE
-        notes.fact("no lamp and no emissive material in the scene: lit by a white world")
-    return Scene(
+    background = read_world(world, textures, notes)
+    emits = any(material.emits for material in materials.found)
+    if fill_in and not lights and not emits and max(background.color) == 0.0:
+        background = WHITE
+        notes.fact("no lamp, no emissive material and a black world: lit by a white one")
+    extracted = Scene(
         name=name,
         vertices=found.vertices,
         triangles=found.triangles,
         material_index=found.material_index,
-        materials=materials,
+        materials=materials.found,
         cameras=cameras,
         lights=lights,
-        world=radiance,
+        world=background,
         geometry=geometry,
+        textures=textures.found,
+        uvs=found.uvs,
+        normals=found.normals,
         source=bpy.data.filepath,
         frame=scene.frame_current,
-        notes=notes.sentences(),
     )
+    _say_features(extracted, scene, notes)
+    extracted.notes = notes.sentences()
+    return extracted
 
 
 def _say_geometry(found: Geometry, geometry: str, notes: Notes) -> None:
@@ -91,9 +111,34 @@ def _say_geometry(found: Geometry, geometry: str, notes: Notes) -> None:
         f"{geometry} geometry ({levels} of modifiers): {found.objects} objects and instances, "
         f"{found.meshes} distinct"
     )
-    notes.fact(
-        "left out: smooth shading, textures and motion blur; every surface is flat and opaque"
-    )
+
+
+def _say_features(extracted: Scene, scene: bpy.types.Scene, notes: Notes) -> None:
+    """What is modelled of what the scene uses, and what a render setting asks for in vain."""
+    models = {part.model for material in extracted.materials for part in material.components}
+    features = {
+        "smooth shading": extracted.normals is not None,
+        "image textures": extracted.uvs is not None,
+        "environment texture": extracted.world.texture is not None,
+        "glossy reflection": bool(models & {"principled", "glossy", "glass"}),
+        "refraction": bool(models & {"glass", "refraction"})
+        or any(
+            part.transmission != 0.0
+            for material in extracted.materials
+            for part in material.components
+        ),
+        "translucency": "translucent" in models,
+        "transparency": "transparent" in models,
+        "emissive materials": any(material.emits for material in extracted.materials),
+        "lamps": bool(extracted.lights),
+        "depth of field": any(camera.lens_radius > 0.0 for camera in extracted.cameras),
+    }
+    used = [name for name, is_used in features.items() if is_used]
+    notes.fact("modelled: " + (", ".join(used) if used else "diffuse surfaces alone"))
+    if "principled" in models and bpy.app.version < (4, 0, 0):
+        notes.fact("approximated: the Principled BSDF of this Blender as that of Blender 4.0")
+    if scene.render.use_motion_blur:
+        notes.fact("left out: motion blur")
 
 
 def _scene_name(scene: bpy.types.Scene) -> str:

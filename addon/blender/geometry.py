@@ -3,7 +3,7 @@
 
 Winding: a triangle's geometric normal, ``cross(v1 - v0, v2 - v0)``, points where Blender's face
 normal does. A mirrored transform (negative determinant) would turn it round, so such an instance
-has its second and third vertex swapped; triangle order and vertex order stay as they are.
+has its second and third corner swapped; triangle order and vertex order stay as they are.
 """
 
 from __future__ import annotations
@@ -12,9 +12,11 @@ from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
-import numpy.typing as npt
 
 from ..study.scene import Float32Array, Float64Array, UInt32Array
+from .corners import CornerParts, normals_to_world
+from .local_mesh import LocalMesh, read_object
+from .materials import Materials
 from .notes import Notes
 
 LEFT_OUT = {
@@ -32,30 +34,17 @@ class ExtractError(ValueError):
 
 
 @dataclass
-class LocalMesh:
-    """One mesh in its own space.
-
-    ``vertices`` (V, 3) float32, ``triangles`` (T, 3) uint32, ``slots`` (T,) int32: material slots.
-    """
-
-    vertices: Float32Array
-    triangles: UInt32Array
-    slots: npt.NDArray[np.int32]
-    materials: list[bpy.types.Material | None]
-
-
-@dataclass
 class Geometry:
     """All triangles in world space, as in `Scene`.
 
-    ``materials[0]`` is None: the default material of an empty slot. ``objects`` counts the placed
-    instances, ``meshes`` the distinct meshes among them.
+    ``objects`` counts the placed instances, ``meshes`` the distinct meshes among them.
     """
 
     vertices: Float32Array
     triangles: UInt32Array
     material_index: UInt32Array
-    materials: list[bpy.types.Material | None]
+    uvs: Float32Array | None = None
+    normals: Float32Array | None = None
     objects: int = 0
     meshes: int = 0
 
@@ -65,43 +54,45 @@ class _Parts:
     vertices: list[Float32Array] = field(default_factory=list)
     triangles: list[UInt32Array] = field(default_factory=list)
     material_index: list[UInt32Array] = field(default_factory=list)
+    corners: CornerParts = field(default_factory=CornerParts)
     vertex_count: int = 0
 
 
-def gather(depsgraph: bpy.types.Depsgraph, viewport: bool, notes: Notes) -> Geometry:
+def gather(
+    depsgraph: bpy.types.Depsgraph, viewport: bool, materials: Materials, notes: Notes
+) -> Geometry:
     """Collect the triangles of every visible instance; a mesh is read once however often it stands.
 
     Raises ExtractError for a non-finite vertex and for more vertices than uint32 counts.
     """
-    local_meshes: dict[int, LocalMesh] = {}
-    numbers: dict[int, int] = {0: 0}
-    materials: list[bpy.types.Material | None] = [None]
+    local_meshes: dict[tuple[int, tuple[str, ...]], LocalMesh] = {}
     parts = _Parts()
     for instance in depsgraph.object_instances:
         obj = instance.object
         if not instance.show_self or not _has_surface(obj, viewport, notes):
             continue
-        key = obj.data.as_pointer()
+        slots = _slot_numbers(obj, materials)
+        by_slot = [materials.uv_layer(number) for number in slots.tolist()]
+        layers = tuple(dict.fromkeys(layer for layer in by_slot if layer is not None))
+        key = (obj.data.as_pointer(), layers)
         if key not in local_meshes:
-            local_meshes[key] = _read_object(obj)
+            local_meshes[key] = read_object(obj, layers)
         local = local_meshes[key]
         if len(local.triangles):
-            slots = _slot_numbers(obj, local, numbers, materials)
-            _place(parts, local, np.array(instance.matrix_world), slots, obj.name)
+            _place(parts, local, np.array(instance.matrix_world), slots, by_slot, obj.name)
     if not parts.triangles:
         return Geometry(
-            np.zeros((0, 3), np.float32),
-            np.zeros((0, 3), np.uint32),
-            np.zeros(0, np.uint32),
-            [None],
+            np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32), np.zeros(0, np.uint32)
         )
+    vertices, triangles = np.concatenate(parts.vertices), np.concatenate(parts.triangles)
     return Geometry(
-        np.concatenate(parts.vertices),
-        np.concatenate(parts.triangles),
+        vertices,
+        triangles,
         np.concatenate(parts.material_index),
-        materials,
+        parts.corners.uvs(len(triangles)) if materials.any_texture else None,
+        parts.corners.normals(vertices, triangles),
         objects=len(parts.triangles),
-        meshes=sum(len(mesh.triangles) > 0 for mesh in local_meshes.values()),
+        meshes=len({key[0] for key, mesh in local_meshes.items() if len(mesh.triangles)}),
     )
 
 
@@ -126,67 +117,49 @@ def _has_surface(obj: bpy.types.Object, viewport: bool, notes: Notes) -> bool:
     return True
 
 
-def _read_object(obj: bpy.types.Object) -> LocalMesh:
-    if not obj.data.is_editmode:
-        return _read_mesh(obj.data)
-    try:  # in Edit Mode the evaluated mesh may be a shell around the edited one
-        return _read_mesh(obj.to_mesh())
-    finally:
-        obj.to_mesh_clear()
-
-
-def _read_mesh(mesh: bpy.types.Mesh) -> LocalMesh:
-    mesh.calc_loop_triangles()
-    count = len(mesh.loop_triangles)
-    vertices = np.empty(3 * len(mesh.vertices), np.float32)
-    triangles = np.empty(3 * count, np.int32)
-    slots = np.empty(count, np.int32)
-    mesh.vertices.foreach_get("co", vertices)
-    mesh.loop_triangles.foreach_get("vertices", triangles)
-    mesh.loop_triangles.foreach_get("material_index", slots)
-    corners = triangles.view(np.uint32).reshape(-1, 3)
-    return LocalMesh(vertices.reshape(-1, 3), corners, slots, list(mesh.materials))
-
-
-def _slot_numbers(
-    obj: bpy.types.Object,
-    local: LocalMesh,
-    numbers: dict[int, int],
-    materials: list[bpy.types.Material | None],
-) -> UInt32Array:
+def _slot_numbers(obj: bpy.types.Object, materials: Materials) -> UInt32Array:
     """Scene-wide material number of each slot of ``obj``; number 0 stands for an empty slot."""
-    slots = obj.material_slots
+    slots, own = obj.material_slots, obj.data.materials
     found = []
-    for index in range(max(len(slots), len(local.materials), 1)):
-        material = local.materials[index] if index < len(local.materials) else None
+    for index in range(max(len(slots), len(own), 1)):
+        material = own[index] if index < len(own) else None
         # The mesh's own list wins, which geometry nodes may have replaced, unless the slot belongs
         # to the object.
-        beyond = index >= len(local.materials)
+        beyond = index >= len(own)
         if index < len(slots) and (beyond or slots[index].link == "OBJECT"):
             material = slots[index].material
-        pointer = material.original.as_pointer() if material else 0
-        if pointer not in numbers:
-            numbers[pointer] = len(materials)
-            materials.append(material)
-        found.append(numbers[pointer])
+        found.append(materials.number(material))
     return np.array(found, np.uint32)
 
 
 def _place(
-    parts: _Parts, local: LocalMesh, matrix: Float64Array, slots: UInt32Array, name: str
+    parts: _Parts,
+    local: LocalMesh,
+    matrix: Float64Array,
+    slots: UInt32Array,
+    layers: list[str | None],
+    name: str,
 ) -> None:
     """Append ``local`` under ``matrix``: transformed in float64 and rounded once to float32."""
     linear, offset = matrix[:3, :3], matrix[:3, 3]
     with np.errstate(over="ignore", invalid="ignore"):
         world = (local.vertices.astype(np.float64) @ linear.T + offset).astype(np.float32)
     _check_finite(world, name)
-    triangles = local.triangles + np.uint32(parts.vertex_count)
-    if np.linalg.det(linear) < 0.0:
-        triangles = triangles[:, [0, 2, 1]]
-    parts.vertices.append(world)
-    parts.triangles.append(triangles)
+    mirrored = np.linalg.det(linear) < 0.0
+    corners = [0, 2, 1] if mirrored else [0, 1, 2]
     # A face whose index lies beyond the last slot takes the last slot, as in Cycles.
-    parts.material_index.append(slots[np.clip(local.slots, 0, len(slots) - 1)])
+    slot = np.clip(local.slots, 0, len(slots) - 1)
+    uvs = local.uvs_by_slot(slot, layers)
+    parts.corners.add(
+        len(local.triangles),
+        uvs[:, corners] if uvs is not None else None,
+        local.smooth,
+        normals_to_world(local.normals[:, corners], linear) if local.normals is not None else None,
+    )
+    triangles = local.triangles + np.uint32(parts.vertex_count)
+    parts.vertices.append(world)
+    parts.triangles.append(triangles[:, corners] if mirrored else triangles)
+    parts.material_index.append(slots[slot])
     parts.vertex_count += len(world)
     if parts.vertex_count > MAX_VERTICES:
         raise ExtractError(

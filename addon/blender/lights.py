@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender lamps and world as plain lights, in Blender's units: watts, and W/m2 for a sun."""
+"""Blender lamps as plain lights, in Blender's units: watts, and W/m2 for a sun."""
 
 from __future__ import annotations
 
@@ -10,14 +10,16 @@ import numpy as np
 
 from ..study.scene import Light
 from .cameras import without_scale
-from .materials import Color, constant_color, constant_value, linked_node, node_tree
+from .nodes import Input
 from .notes import Notes
+from .shaders import ShaderReader
+from .textures import Textures
 
 KINDS = {"POINT": "point", "SUN": "sun", "SPOT": "spot", "AREA": "area"}
-TEXTURED_WORLD = (0.5, 0.5, 0.5)
+RAY_VISIBILITY = ("visible_diffuse", "visible_glossy", "visible_transmission")
 
 
-def read_lights(depsgraph: bpy.types.Depsgraph, notes: Notes) -> list[Light]:
+def read_lights(depsgraph: bpy.types.Depsgraph, textures: Textures, notes: Notes) -> list[Light]:
     """Every visible lamp, instances included, that emits anything."""
     lights = []
     for instance in depsgraph.object_instances:
@@ -26,29 +28,60 @@ def read_lights(depsgraph: bpy.types.Depsgraph, notes: Notes) -> list[Light]:
             if getattr(getattr(obj.data, "cycles", None), "is_portal", False):
                 notes.add("left out: light portals", obj.name)
                 continue
-            light = read_light(obj.name, obj.data, np.array(instance.matrix_world), notes)
-            if max(light.color) > 0.0:
+            _say_settings(obj, notes)
+            matrix = np.array(instance.matrix_world)
+            light = read_light(obj.name, obj.data, matrix, textures, notes)
+            if light is not None:
                 lights.append(light)
     return lights
 
 
-def read_light(name: str, data: bpy.types.Light, matrix: np.ndarray, notes: Notes) -> Light:
-    """One lamp under ``matrix`` (4, 4)."""
+def read_light(
+    name: str, data: bpy.types.Light, matrix: np.ndarray, textures: Textures, notes: Notes
+) -> Light | None:
+    """One lamp under ``matrix`` (4, 4); None for one that gives no light."""
     size_x, size_y = _size(data, matrix)
-    strength = _strength(name, data, size_x, size_y, notes)
-    if data.type == "AREA" and getattr(data, "spread", math.pi) < math.pi - 1e-4:
-        notes.add("approximated: area light spread ignored", name)
+    if data.type == "AREA" and not size_x * size_y > 0.0:
+        notes.add("left out: area light without area", name)
+        return None
+    strength = _strength(name, data, size_x, size_y, textures, notes)
+    if not np.isfinite(strength).all():
+        notes.add("left out: light whose strength is not a finite number", name)
+        return None
+    if strength.min() < 0.0:
+        notes.add("left out: negative light counts as 0", name)
+    color = tuple(max(0.0, float(channel)) for channel in strength)
+    if max(color) == 0.0:
+        return None
     return Light(
         name=name,
         kind=KINDS[data.type],
         to_world=without_scale(matrix),
-        color=tuple(max(0.0, float(channel)) for channel in strength),
+        color=color,
         size_x=size_x,
         size_y=size_y,
         shape="disk" if data.type == "AREA" and data.shape in {"DISK", "ELLIPSE"} else "rectangle",
         spot_angle=float(data.spot_size) if data.type == "SPOT" else math.pi,
         spot_blend=float(data.spot_blend) if data.type == "SPOT" else 0.0,
     )
+
+
+def _say_settings(obj: bpy.types.Object, notes: Notes) -> None:
+    """Name what the lamp has and no light of ours does."""
+    data, linking = obj.data, getattr(obj, "light_linking", None)
+    if data.type == "AREA" and getattr(data, "spread", math.pi) < math.pi - 1e-4:
+        notes.add("approximated: area light spread ignored", obj.name)
+    if data.type == "SPOT" and bpy.app.version < (4, 0, 0):
+        notes.add("approximated: spot light without the cosine of older Cycles", obj.name)
+    if not all(getattr(obj, name) for name in RAY_VISIBILITY):
+        notes.add("approximated: ray visibility is ignored, every ray sees these", obj.name)
+    if linking and (linking.receiver_collection or linking.blocker_collection):
+        notes.add("approximated: light linking is ignored, these light everything", obj.name)
+    casts = getattr(data, "use_shadow", True) and getattr(
+        getattr(data, "cycles", None), "cast_shadow", True
+    )
+    if not casts:
+        notes.add("approximated: light without shadows casts them", obj.name)
 
 
 def _size(data: bpy.types.Light, matrix: np.ndarray) -> tuple[float, float]:
@@ -63,20 +96,24 @@ def _size(data: bpy.types.Light, matrix: np.ndarray) -> tuple[float, float]:
 
 
 def _strength(
-    name: str, data: bpy.types.Light, size_x: float, size_y: float, notes: Notes
+    name: str,
+    data: bpy.types.Light,
+    size_x: float,
+    size_y: float,
+    textures: Textures,
+    notes: Notes,
 ) -> np.ndarray:
     color = np.array(data.color[:], np.float64) * data.energy
     if data.type == "AREA" and bpy.app.version < (4, 0, 0):
-        color *= (
-            math.pi / 4.0
-        )  # what such a lamp emitted before Blender took its watts at their word
+        # What such a lamp emitted before Blender took its watts at their word.
+        color *= math.pi / 4.0
     color *= 2.0 ** getattr(data, "exposure", 0.0)  # Blender 4.5 and later
     if getattr(data, "use_temperature", False):
         color *= np.array(data.temperature_color[:])
     if not getattr(data, "normalize", True):
         color *= _emitting_area(data, size_x, size_y)
     if data.use_nodes and data.node_tree:
-        color *= _node_factor(name, data.node_tree, notes)
+        color *= _node_factor(name, data.node_tree, textures, notes)
     return color
 
 
@@ -90,44 +127,17 @@ def _emitting_area(data: bpy.types.Light, size_x: float, size_y: float) -> float
     return 4.0 * math.pi * size_x * size_x or 1.0
 
 
-def _node_factor(name: str, tree: bpy.types.NodeTree, notes: Notes) -> np.ndarray:
-    """The constant emission by which a light's nodes multiply it; anything cleverer counts as 1."""
-    output = tree.get_output_node("ALL") or tree.get_output_node("CYCLES")
-    shader = linked_node(output.inputs["Surface"]) if output else None
-    if shader is None or shader.type != "EMISSION":
-        notes.add("approximated: light nodes ignored", name)
-        return np.ones(3)
-    color, exact = constant_color(shader.inputs["Color"])
-    strength, strength_exact = constant_value(shader.inputs["Strength"])
-    if not (exact and strength_exact):
-        notes.add("approximated: light nodes ignored", name)
-        return np.ones(3)
-    return np.array(color) * strength
-
-
-def read_world(world: bpy.types.World | None, notes: Notes) -> Color:
-    """Constant radiance: colour times strength of the Background node, else the plain colour."""
-    if world is None:
-        return (0.0, 0.0, 0.0)
-    tree = node_tree(world)
-    if tree is None:
-        return tuple(float(channel) for channel in world.color)
-    output = tree.get_output_node("ALL") or tree.get_output_node("CYCLES")
-    shader = linked_node(output.inputs["Surface"]) if output else None
-    if shader is None:
-        return (0.0, 0.0, 0.0)
-    if shader.type != "BACKGROUND":
-        notes.fact(
-            f"approximated: the nodes of world '{world.name}' are replaced by its plain colour"
-        )
-        return tuple(float(channel) for channel in world.color)
-    color, exact = constant_color(shader.inputs["Color"])
-    strength, strength_exact = constant_value(shader.inputs["Strength"])
-    if not (exact and strength_exact):
-        notes.fact(
-            f"approximated: the texture of world '{world.name}' is replaced by mid grey "
-            "times its strength"
-        )
-    if not exact:
-        color = TEXTURED_WORLD
-    return tuple(max(0.0, channel * strength) for channel in color)
+def _node_factor(
+    name: str, tree: bpy.types.NodeTree, textures: Textures, notes: Notes
+) -> np.ndarray:
+    """The emission by which a light's nodes multiply it; a texture counts as a constant."""
+    output = tree.get_output_node("CYCLES") or tree.get_output_node("ALL")
+    if output is None:
+        return np.zeros(3)
+    reader = ShaderReader(textures)
+    emission = reader.surface(Input(output.inputs["Surface"])).emission
+    if not emission.is_constant():
+        reader.lost.add("approximated: textured light by a constant")
+    for kind in sorted(reader.lost):
+        notes.add(kind, name)
+    return np.array(emission.typical().offset)

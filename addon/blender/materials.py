@@ -1,220 +1,190 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender materials as diffuse stand-ins: constants from the sockets of the shader at the output.
+"""Blender materials as components: the shader tree at the output, multiplied out.
 
-Whatever a constant diffuse reflectance and emission cannot hold is named in the notes.
+Whatever the components cannot hold is named in the notes.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import replace
 
 import bpy
 
-from ..study.scene import Material
+from ..study.scene import Color, Component, Lookup, Material
+from .nodes import Input, linked, node_tree
 from .notes import Notes
+from .shaders import Part, ShaderReader, Surface
+from .textures import Textures
+from .value_nodes import Evaluator
+from .values import Value, constant
 
-Color = tuple[float, float, float]
-BLACK: Color = (0.0, 0.0, 0.0)
 DEFAULT = Material("(default)")
-MAX_DEPTH = 32  # nested shaders; deeper trees count as unknown
-
-# Shaders of one colour: what a diffuse stand-in gets wrong about them, None where nothing.
-COLORED_SHADERS = {
-    "BSDF_DIFFUSE": None,
-    "BSDF_GLOSSY": "glossy",
-    "BSDF_ANISOTROPIC": "glossy",
-    "BSDF_METALLIC": "metallic",
-    "BSDF_GLASS": "transmission",
-    "BSDF_REFRACTION": "transmission",
-    "BSDF_TRANSLUCENT": "translucency",
-    "BSDF_TRANSPARENT": "transparency",
-    "BSDF_VELVET": "sheen",
-    "BSDF_SHEEN": "sheen",
-    "BSDF_TOON": "toon shading",
-    "SUBSURFACE_SCATTERING": "subsurface scattering",
-    "EEVEE_SPECULAR": "glossy",
-}
+MOST_COMPONENTS = 4
+LAMBERTIAN = {"diffuse", "translucent", "transparent"}
 
 
-@dataclass
-class Surface:
-    """What a shader comes to: reflectance, emitted radiance, and the features that are lost."""
+class Materials:
+    """The materials of a scene in the order in which they were met; the first is the default."""
 
-    base: Color = BLACK
-    emission: Color = BLACK
-    lost: set[str] = field(default_factory=set)
+    def __init__(self, textures: Textures, notes: Notes) -> None:
+        self.found: list[Material] = [DEFAULT]
+        self._layers: list[str | None] = [None]
+        self._numbers: dict[int, int] = {0: 0}
+        self._textures, self._notes = textures, notes
+
+    def number(self, material: bpy.types.Material | None) -> int:
+        """Its number, 0 for None; it is read when met first."""
+        pointer = material.original.as_pointer() if material else 0
+        if pointer not in self._numbers:
+            self._numbers[pointer] = len(self.found)
+            read, layer = read_material(material, self._textures, self._notes)
+            self.found.append(read)
+            self._layers.append(layer)
+        return self._numbers[pointer]
+
+    def uv_layer(self, number: int) -> str | None:
+        """The UV map that the material looks its textures up with, "" for the one that renders.
+
+        None where it looks nothing up.
+        """
+        return self._layers[number]
+
+    @property
+    def any_texture(self) -> bool:
+        """Whether any of them looks a texture up."""
+        return any(layer is not None for layer in self._layers)
 
 
-def read_material(material: bpy.types.Material | None, notes: Notes) -> Material:
-    """The stand-in for one material; None gives Blender's default grey."""
-    if material is None:
-        return DEFAULT
+def read_material(
+    material: bpy.types.Material, textures: Textures, notes: Notes
+) -> tuple[Material, str | None]:
+    """The material, and the UV map that it needs as in `Materials.uv_layer`."""
+    reader = ShaderReader(textures)
+    surface = _surface(material, reader)
+    parts = _limited(_merged([_sane(part) for part in surface.parts]), reader)
+    values = [value for part in parts for value in _values(part)] + [surface.emission]
+    layers = {value.texel.layer: None for value in values if value.texel is not None}
+    if len(layers) > 1:
+        reader.lost.add("approximated: several UV maps by the first")
+    read = Material(
+        material.name,
+        [_component(part) for part in parts],
+        _emission(surface.emission, reader),
+    )
+    for kind in sorted(reader.lost):
+        notes.add(kind, material.name)
+    return read, next(iter(layers), None)
+
+
+def _surface(material: bpy.types.Material, reader: ShaderReader) -> Surface:
     tree = node_tree(material)
     if tree is None:
-        return Material(material.name, _reflectance(material.diffuse_color[:3]))
+        color = tuple(float(channel) for channel in material.diffuse_color[:3])
+        return Surface([Part("diffuse", color=constant(color))])
     output = tree.get_output_node("CYCLES") or tree.get_output_node("ALL")
-    surface = _shader(output.inputs["Surface"], 0) if output else Surface()
-    for feature in sorted(surface.lost):
-        notes.add(f"approximated by plain diffuse: {feature}", material.name)
-    if output and output.inputs["Displacement"].is_linked:
-        notes.add("left out: displacement", material.name)
-    return Material(material.name, _reflectance(surface.base), _radiance(surface.emission))
-
-
-def node_tree(block: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree | None:
-    """The node tree in use; from Blender 5.0 on it always is, and the switch is deprecated."""
-    if bpy.app.version < (5, 0, 0) and not block.use_nodes:
-        return None
-    return block.node_tree
-
-
-def linked_node(socket: bpy.types.NodeSocket) -> bpy.types.Node | None:
-    """The node that feeds ``socket``, through reroutes; None when nothing does."""
-    source = linked_socket(socket)
-    return source.node if source else None
-
-
-def linked_socket(socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket | None:
-    """The output that feeds ``socket``, through reroutes."""
-    for _ in range(MAX_DEPTH):
-        if not socket.is_linked or socket.links[0].is_muted:
-            return None
-        source = socket.links[0].from_socket
-        if source.node.type != "REROUTE":
-            return source
-        socket = source.node.inputs[0]
-    return None
-
-
-def constant_color(socket: bpy.types.NodeSocket) -> tuple[Color, bool]:
-    """The socket's colour, and whether that is the whole truth (no texture feeds it)."""
-    node = linked_node(socket)
-    if node is not None and node.type == "RGB":
-        return _rgb(node.outputs[0].default_value), True
-    return _rgb(socket.default_value), node is None
-
-
-def constant_value(socket: bpy.types.NodeSocket) -> tuple[float, bool]:
-    """The socket's number, and whether that is the whole truth."""
-    node = linked_node(socket)
-    if node is not None and node.type == "VALUE":
-        return float(node.outputs[0].default_value), True
-    return float(socket.default_value), node is None
-
-
-def _shader(socket: bpy.types.NodeSocket, depth: int) -> Surface:
-    """What the shader linked to ``socket`` comes to; black when nothing is linked."""
-    source = linked_socket(socket)
-    if source is None:
+    if output is None:
         return Surface()
-    node = source.node
-    if depth > MAX_DEPTH:
-        return Surface(lost={"deeply nested shaders"})
-    if node.type == "BSDF_PRINCIPLED":
-        return _principled(node)
-    if node.type == "EMISSION":
-        return _emission(node.inputs["Color"], node.inputs["Strength"])
-    if node.type in COLORED_SHADERS:
-        return _colored(node)
-    if node.type == "MIX_SHADER":
-        return _mix(node, depth)
-    if node.type == "ADD_SHADER":
-        return _weighted(
-            _shader(node.inputs[0], depth + 1), 1.0, _shader(node.inputs[1], depth + 1), 1.0
-        )
-    if node.type == "GROUP" and node.node_tree:
-        return _group(node, source, depth)
-    return Surface((0.8, 0.8, 0.8), lost={f"shader node '{node.bl_label}'"})
+    at = {socket.identifier: Input(socket) for socket in output.inputs}
+    if linked(at["Displacement"]) is not None:
+        reader.lost.add("left out: displacement")
+    if linked(at["Volume"]) is not None:
+        reader.lost.add("left out: volume")
+        if linked(at["Surface"]) is None:
+            return Surface([Part("transparent", color=constant(1.0))])
+    return reader.surface(at["Surface"])
 
 
-def _principled(node: bpy.types.Node) -> Surface:
-    base, exact = constant_color(node.inputs["Base Color"])
-    emission = _emission(
-        _input(node, "Emission Color", "Emission"), node.inputs["Emission Strength"]
+def _values(part: Part) -> tuple[Value, ...]:
+    return (part.weight, part.color, part.roughness, part.metallic, part.transmission)
+
+
+def _sane(part: Part) -> Part:
+    """Constants in their range, and of the inputs only those that the model has."""
+    clamped = replace(
+        part,
+        weight=part.weight.clamped(),
+        color=part.color.clamped(),
+        roughness=part.roughness.clamped(),
+        metallic=part.metallic.clamped(),
+        transmission=part.transmission.clamped(),
     )
-    lost = emission.lost | (set() if exact else {"textured colour"})
-    for feature, names, neutral in (
-        ("metallic", ("Metallic",), 0.0),
-        ("transmission", ("Transmission Weight", "Transmission"), 0.0),
-        ("subsurface scattering", ("Subsurface Weight", "Subsurface"), 0.0),
-        ("transparency", ("Alpha",), 1.0),
-    ):
-        value, exact = constant_value(_input(node, *names))
-        if value != neutral or not exact:
-            lost.add(feature)
-    return Surface(base, emission.emission, lost)
+    if part.model in LAMBERTIAN:
+        return replace(clamped, roughness=constant(0.5))
+    return clamped
 
 
-def _emission(color_socket: bpy.types.NodeSocket, strength_socket: bpy.types.NodeSocket) -> Surface:
-    color, color_exact = constant_color(color_socket)
-    strength, strength_exact = constant_value(strength_socket)
-    lost = set() if color_exact and strength_exact else {"textured emission"}
-    return Surface(BLACK, _scaled(color, strength), lost)
+def _merged(parts: list[Part]) -> list[Part]:
+    """Without parts of no weight; Lambertian ones of constants come together."""
+    merged: list[Part] = []
+    for part in parts:
+        if part.weight.is_constant(0.0):
+            continue
+        for index, other in enumerate(merged):
+            if part.model in LAMBERTIAN and part.model == other.model and _fit(part, other):
+                merged[index] = _together(part, other)
+                break
+        else:
+            merged.append(part)
+    return merged
 
 
-def _colored(node: bpy.types.Node) -> Surface:
-    color, exact = constant_color(_input(node, "Color", "Base Color"))
-    feature = COLORED_SHADERS[node.type]
-    lost = ({feature} if feature else set()) | (set() if exact else {"textured colour"})
-    return Surface(color, BLACK, lost)
+def _fit(one: Part, two: Part) -> bool:
+    constants = (one.weight, one.color, two.weight, two.color)
+    if not all(value.is_constant() for value in constants):
+        return False
+    return one.weight.number + two.weight.number <= 1.0 + 1e-6
 
 
-def _mix(node: bpy.types.Node, depth: int) -> Surface:
-    factor, exact = constant_value(node.inputs[0])
-    factor = min(max(factor, 0.0), 1.0)
-    first, second = _shader(node.inputs[1], depth + 1), _shader(node.inputs[2], depth + 1)
-    mixed = _weighted(first, 1.0 - factor, second, factor)
-    if not exact:
-        mixed.lost.add("textured mix of shaders")
-    return mixed
+def _together(one: Part, two: Part) -> Part:
+    whole = one.weight.number + two.weight.number
+    pairs = zip(one.color.offset, two.color.offset, strict=True)
+    shares = (one.weight.number / whole, two.weight.number / whole)
+    color = tuple(shares[0] * a + shares[1] * b for a, b in pairs)
+    return replace(one, weight=constant(min(whole, 1.0)), color=constant(color))
 
 
-def _group(node: bpy.types.Node, source: bpy.types.NodeSocket, depth: int) -> Surface:
-    """Look inside the group; what its inputs feed is read as the constants inside, and said."""
-    outputs = [
-        inner
-        for inner in node.node_tree.nodes
-        if inner.type == "GROUP_OUTPUT" and inner.is_active_output
+def _limited(parts: list[Part], reader: Evaluator) -> list[Part]:
+    """At most four: the heaviest, which share the weight of those left out."""
+    if len(parts) <= MOST_COMPONENTS:
+        return parts
+    reader.lost.add(f"approximated: {len(parts)} shaders by the heaviest {MOST_COMPONENTS}")
+    kept = sorted(parts, key=lambda part: -part.weight.typical().number)[:MOST_COMPONENTS]
+    kept_weight = sum(part.weight.typical().number for part in kept)
+    whole = sum(part.weight.typical().number for part in parts)
+    factor = whole / kept_weight if kept_weight > 0.0 else 1.0
+    return [
+        replace(part, weight=part.weight.times((factor,) * 3).clamped())
+        for part in parts
+        if part in kept
     ]
-    inner = next(
-        (
-            socket
-            for out in outputs
-            for socket in out.inputs
-            if socket.identifier == source.identifier
-        ),
-        None,
-    )
-    surface = _shader(inner, depth + 1) if inner else Surface((0.8, 0.8, 0.8))
-    surface.lost.add(f"node group '{node.node_tree.name}'")
-    return surface
 
 
-def _weighted(first: Surface, weight: float, second: Surface, other: float) -> Surface:
-    def mix(one: Color, two: Color) -> Color:
-        return tuple(weight * a + other * b for a, b in zip(one, two, strict=True))
-
-    return Surface(
-        mix(first.base, second.base), mix(first.emission, second.emission), first.lost | second.lost
+def _component(part: Part) -> Component:
+    return Component(
+        part.model,
+        _number_input(part.weight),
+        _color_input(part.color),
+        _number_input(part.roughness),
+        _number_input(part.metallic),
+        _number_input(part.transmission),
+        part.ior,
+        part.specular,
     )
 
 
-def _input(node: bpy.types.Node, *names: str) -> bpy.types.NodeSocket:
-    """The first input that exists: Blender 4.0 renamed several."""
-    return next(node.inputs[name] for name in names if name in node.inputs)
+def _number_input(value: Value) -> float | Lookup:
+    return value.number if value.texel is None else value.lookup()
 
 
-def _rgb(value: bpy.types.bpy_prop_array) -> Color:
-    return (float(value[0]), float(value[1]), float(value[2]))
+def _color_input(value: Value) -> Color | Lookup:
+    return value.offset if value.texel is None else value.lookup()
 
 
-def _scaled(color: Color, factor: float) -> Color:
-    return (color[0] * factor, color[1] * factor, color[2] * factor)
-
-
-def _reflectance(color: Color) -> Color:
-    return tuple(min(max(float(channel), 0.0), 1.0) for channel in color)
-
-
-def _radiance(color: Color) -> Color:
-    return tuple(max(float(channel), 0.0) for channel in color)
+def _emission(value: Value, reader: Evaluator) -> Color | Lookup:
+    """Radiance, which cannot be negative."""
+    if value.texel is not None:
+        return value.lookup()
+    if min(value.offset) < 0.0:
+        reader.lost.add("left out: negative emission counts as 0")
+    red, green, blue = (max(channel, 0.0) for channel in value.offset)
+    return (red, green, blue)

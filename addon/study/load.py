@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .framing import auto_cameras
-from .scene import Material, Scene
+from .scene import Material, Scene, World
 
 SUFFIXES = (".npz", ".obj", ".ply")
 
@@ -49,7 +49,7 @@ def load_mesh_file(path: Path, up: Literal["y", "z"] = "z") -> Scene:
         materials=[Material("grey")],
         cameras=auto_cameras(vertices[np.unique(triangles)], 3, up),
         lights=[],
-        world=(1.0, 1.0, 1.0),
+        world=World((1.0, 1.0, 1.0)),
         geometry="mesh file",
         source=str(path),
         notes=notes,

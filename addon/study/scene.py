@@ -5,14 +5,22 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-Float32Array = npt.NDArray[np.float32]
-Float64Array = npt.NDArray[np.float64]
-UInt32Array = npt.NDArray[np.uint32]
+Float32Array: TypeAlias = npt.NDArray[np.float32]
+Float64Array: TypeAlias = npt.NDArray[np.float64]
+UInt32Array: TypeAlias = npt.NDArray[np.uint32]
+Color: TypeAlias = tuple[float, float, float]  # linear RGB
+Mapping: TypeAlias = tuple[tuple[float, float, float], tuple[float, float, float]]
+
+WrapName: TypeAlias = Literal["repeat", "extend", "clip", "mirror"]
+ChannelName: TypeAlias = Literal["rgb", "red", "green", "blue", "alpha", "luminance"]
+ModelName: TypeAlias = Literal[
+    "principled", "diffuse", "glossy", "glass", "refraction", "translucent", "transparent"
+]
 
 
 @dataclass
@@ -21,7 +29,8 @@ class Camera:
 
     ``to_world`` is (4, 4) float64 without scale; the camera looks along its -Z with +Y up.
     ``window`` is (left, right, bottom, top): at distance 1 for ``perspective``, in world units for
-    ``orthographic``; lens shift and sensor fit are folded in. ``clip_start`` is in world units.
+    ``orthographic``; lens shift and sensor fit are folded in. ``clip_start``, ``lens_radius`` (0:
+    all is sharp) and ``focus_distance`` (along -Z) are in world units.
     """
 
     name: str
@@ -29,6 +38,8 @@ class Camera:
     to_world: Float64Array
     window: tuple[float, float, float, float]
     clip_start: float = 0.0
+    lens_radius: float = 0.0
+    focus_distance: float = 1.0
 
     @property
     def aspect(self) -> float:
@@ -49,7 +60,7 @@ class Light:
     name: str
     kind: Literal["point", "sun", "spot", "area"]
     to_world: Float64Array
-    color: tuple[float, float, float]
+    color: Color
     size_x: float = 0.0
     size_y: float = 0.0
     shape: Literal["rectangle", "disk"] = "rectangle"
@@ -58,12 +69,78 @@ class Light:
 
 
 @dataclass
-class Material:
-    """A diffuse stand-in for a material: linear RGB reflectance in [0, 1] and emitted radiance."""
+class Texture:
+    """A picture that materials or the world look up: a file's, or ``pixels`` of its own.
+
+    Exactly one of ``path`` and ``pixels`` is given; ``pixels`` is (H, W) or (H, W, 1, 3 or 4),
+    uint8 or float32, top row first. ``srgb``: colours are encoded with the sRGB curve.
+    ``closest``: texels are not interpolated.
+    """
 
     name: str
-    base_color: tuple[float, float, float] = (0.8, 0.8, 0.8)
-    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    path: str = ""
+    pixels: npt.NDArray[Any] | None = None
+    srgb: bool = False
+    wrap: WrapName = "repeat"
+    closest: bool = False
+
+
+@dataclass(frozen=True)
+class Lookup:
+    """A value that varies over a surface: ``offset + scale * texel(mapping @ (u, v, 1))``.
+
+    ``texture`` indexes ``Scene.textures``; a single ``channel`` fills all three of a colour.
+    """
+
+    texture: int
+    channel: ChannelName = "rgb"
+    scale: Color = (1.0, 1.0, 1.0)
+    offset: Color = (0.0, 0.0, 0.0)
+    mapping: Mapping = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+
+
+@dataclass
+class Component:
+    """One way in which a material scatters; the fields mean what Blender's node of ``model`` says.
+
+    ``specular`` is the factor of a principled coat's normal reflectance, which ``ior`` gives.
+    """
+
+    model: ModelName = "diffuse"
+    weight: float | Lookup = 1.0
+    color: Color | Lookup = (0.8, 0.8, 0.8)
+    roughness: float | Lookup = 0.5
+    metallic: float | Lookup = 0.0
+    transmission: float | Lookup = 0.0
+    ior: float = 1.45
+    specular: float = 1.0
+
+
+@dataclass
+class Material:
+    """What a surface does with light: the sum of at most four components, and emitted radiance."""
+
+    name: str
+    components: list[Component] = field(default_factory=lambda: [Component()])
+    emission: Color | Lookup = (0.0, 0.0, 0.0)
+
+    @property
+    def emits(self) -> bool:
+        """Whether it may emit light."""
+        return isinstance(self.emission, Lookup) or max(self.emission) > 0.0
+
+
+@dataclass
+class World:
+    """The background: ``color``, or the equirectangular texture of that index times ``color``.
+
+    ``to_texture`` (3, 3) turns directions in the world into the picture's: its Z is up and its
+    centre lies at +X.
+    """
+
+    color: Color = (0.0, 0.0, 0.0)
+    texture: int | None = None
+    to_texture: Float64Array = field(default_factory=lambda: np.eye(3))
 
 
 @dataclass
@@ -71,7 +148,9 @@ class Scene:
     """Triangles in world space with what the picture needs.
 
     ``vertices`` (V, 3) float32, ``triangles`` (T, 3) uint32, ``material_index`` (T,) uint32 into
-    ``materials``. ``notes`` says, a sentence each, what was added, approximated or left out.
+    ``materials``. ``uvs`` (T, 3, 2) float32 and ``normals`` (T, 3, 3) float32, unit length, belong
+    to the triangles' corners; None where no material looks a texture up, or where all is flat.
+    ``notes`` says, a sentence each, what was added, approximated or left out.
     """
 
     name: str
@@ -81,8 +160,11 @@ class Scene:
     materials: list[Material]
     cameras: list[Camera]
     lights: list[Light]
-    world: tuple[float, float, float]
+    world: World
     geometry: Literal["viewport", "render", "mesh file"]
+    textures: list[Texture] = field(default_factory=list)
+    uvs: Float32Array | None = None
+    normals: Float32Array | None = None
     source: str = ""
     frame: int = 0
     notes: list[str] = field(default_factory=list)

@@ -69,6 +69,36 @@ class Cameras(EmptySceneTest):
         self.assertEqual([camera.name for camera in scene.cameras], ["B", "A", "C"])
         self.assertEqual(scene.cameras[0].clip_start, 0.5)
 
+    def test_depth_of_field(self) -> None:
+        obj, target = add_camera(), add_cube("Target")
+        obj.location, obj.rotation_euler, obj.scale = (1, 2, 3), (0.5, 0.25, 1), (2, 2, 2)
+        data = obj.data
+        data.lens, data.dof.aperture_fstop, data.dof.focus_distance = 50, 2.0, 7.5
+        camera = self.extract().cameras[0]
+        self.assertEqual(camera.lens_radius, 0.0)
+        data.dof.use_dof = True
+        camera = self.extract().cameras[0]
+        self.assertAlmostEqual(camera.lens_radius, 0.0125, places=7)
+        self.assertEqual(camera.focus_distance, 7.5)
+        data.dof.focus_object, target.location = target, (4, -3, 1)
+        camera = self.extract().cameras[0]
+        local = np.linalg.inv(camera.to_world) @ (4, -3, 1, 1)
+        self.assertAlmostEqual(camera.focus_distance, abs(local[2]), places=5)
+        data.type = "ORTHO"
+        self.assertAlmostEqual(self.extract().cameras[0].lens_radius, 0.25, places=7)
+        self.assertTrue([note for note in self.extract().notes if "depth of field" in note])
+
+    def test_lens_that_is_not_modelled_is_said(self) -> None:
+        dof = add_camera("Lens").data.dof
+        dof.use_dof, dof.aperture_blades, dof.aperture_ratio = True, 6, 2.0
+        notes = self.extract().notes
+        self.assertIn("Approximated: aperture blades, the aperture is round: Lens.", notes)
+        self.assertIn("Approximated: anamorphic bokeh, the aperture is round: Lens.", notes)
+        dof.focus_distance = 0
+        scene = self.extract()
+        self.assertEqual(scene.cameras[0].lens_radius, 0.0)
+        self.assertIn("Left out: depth of field focused on the camera itself: Lens.", scene.notes)
+
     def test_panorama_is_said(self) -> None:
         add_camera("Dome").data.type = "PANO"
         scene = self.extract()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lamps, world and materials: constants in Blender's units."""
+"""Lamps: constants in Blender's units."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import unittest
 
 import bpy
 import numpy as np
-from blender_support import EmptySceneTest, add_cube, add_light, add_material, link, use_nodes
+from blender_support import EmptySceneTest, add_cube, add_light, link
 
 
 class Lights(EmptySceneTest):
@@ -111,145 +111,56 @@ class Lights(EmptySceneTest):
         self.assertEqual(len(self.extract().lights), 3)
 
 
-class Worlds(EmptySceneTest):
+class BadLights(EmptySceneTest):
+    """What gives no light is left out and named."""
+
     def setUp(self) -> None:
         super().setUp()
         add_cube()
+        add_light("POINT", "Good").data.energy = 1
 
-    def world(self) -> bpy.types.World:
-        world = bpy.data.worlds.new("World")
-        use_nodes(world)
-        bpy.context.scene.world = world
-        add_light("POINT").data.energy = 1
-        return world
-
-    def test_background_node(self) -> None:
-        background = self.world().node_tree.nodes["Background"]
-        background.inputs["Color"].default_value, background.inputs["Strength"].default_value = (
-            (0.5, 0.25, 1, 1),
-            2,
-        )
-        self.assertEqual(self.extract().world, (1.0, 0.5, 2.0))
-
-    def test_texture_is_said(self) -> None:
-        world = self.world()
-        tree = world.node_tree
-        tree.links.new(
-            tree.nodes.new("ShaderNodeTexEnvironment").outputs[0],
-            tree.nodes["Background"].inputs["Color"],
-        )
+    def check_left_out(self, said: str) -> None:
         scene = self.extract()
-        self.assertEqual(scene.world, (0.5, 0.5, 0.5))
-        self.assertTrue(any("texture of world 'World'" in note for note in scene.notes))
+        self.assertEqual([light.name for light in scene.lights], ["Good"])
+        self.assertEqual([note for note in scene.notes if note == said], [said])
 
-    def test_no_world_is_black(self) -> None:
-        add_light("POINT").data.energy = 1
-        self.assertEqual(self.extract().world, (0.0, 0.0, 0.0))
+    def test_negative_power(self) -> None:
+        add_light("SPOT", "Dark").data.energy = -5
+        self.check_left_out("Left out: negative light counts as 0: Dark.")
 
-    def test_no_light_is_a_white_world(self) -> None:
+    def test_area_without_area(self) -> None:
+        obj = add_light("AREA", "Flat")
+        obj.data.energy, obj.scale = 5, (0, 1, 1)
+        self.check_left_out("Left out: area light without area: Flat.")
+
+    def test_strength_not_a_number(self) -> None:
+        data = add_light("POINT", "Broken").data
+        data.energy = math.nan
+        self.check_left_out("Left out: light whose strength is not a finite number: Broken.")
+
+    def test_portal(self) -> None:
+        data = add_light("AREA", "Window").data
+        if getattr(data, "cycles", None) is None:
+            self.skipTest("this Blender has no Cycles")
+        data.cycles.is_portal = True
+        self.check_left_out("Left out: light portals: Window.")
+
+    def test_settings_that_are_ignored(self) -> None:
+        obj = add_light("AREA", "Odd")
+        obj.data.energy, obj.data.spread, obj.visible_glossy = 1, 1.0, False
+        notes = self.extract().notes
+        self.assertIn("Approximated: area light spread ignored: Odd.", notes)
+        self.assertIn("Approximated: ray visibility is ignored, every ray sees these: Odd.", notes)
+
+    def test_textured_nodes(self) -> None:
+        data = add_light("POINT", "Slide").data
+        data.energy, data.use_nodes = 10, True
+        tree = data.node_tree
+        noise = tree.nodes.new("ShaderNodeTexNoise")
+        tree.links.new(noise.outputs[0], tree.nodes["Emission"].inputs["Strength"])
         scene = self.extract()
-        self.assertEqual(scene.world, (1.0, 1.0, 1.0))
-        self.assertTrue(any("white world" in note for note in scene.notes))
-
-
-class Materials(EmptySceneTest):
-    def setUp(self) -> None:
-        super().setUp()
-        self.cube = add_cube()
-
-    def material(self, name: str, color: tuple[float, float, float]) -> bpy.types.Material:
-        material = add_material(name)
-        principled = material.node_tree.nodes["Principled BSDF"]
-        principled.inputs["Base Color"].default_value = (*color, 1)
-        return material
-
-    def test_index_of_each_triangle(self) -> None:
-        self.cube.data.materials.append(self.material("Red", (1, 0, 0)))
-        self.cube.data.materials.append(self.material("Green", (0, 1, 0)))
-        for polygon in self.cube.data.polygons:
-            polygon.material_index = polygon.index % 2
-        scene = self.extract()
-        names = [scene.materials[index].name for index in scene.material_index]
-        self.assertEqual(names, ["Red", "Red", "Green", "Green"] * 3)
-        self.assertEqual(scene.materials[scene.material_index[0]].base_color, (1.0, 0.0, 0.0))
-
-    def test_slot_of_the_object_wins(self) -> None:
-        self.cube.data.materials.append(self.material("Red", (1, 0, 0)))
-        twin = link(bpy.data.objects.new("Twin", self.cube.data))
-        twin.material_slots[0].link = "OBJECT"
-        twin.material_slots[0].material = self.material("Blue", (0, 0, 1))
-        scene = self.extract()
-        names = [scene.materials[index].name for index in scene.material_index]
-        self.assertEqual(sorted(set(names)), ["Blue", "Red"])
-        self.assertEqual(names.count("Blue"), 12)
-
-    def test_missing_slot_and_index_beyond_the_slots(self) -> None:
-        scene = self.extract()
-        self.assertEqual(
-            {scene.materials[index].name for index in scene.material_index}, {"(default)"}
-        )
-        self.cube.data.materials.append(None)
-        self.cube.data.materials.append(self.material("Last", (0, 1, 0)))
-        self.cube.data.polygons[0].material_index = 7
-        scene = self.extract()
-        names = [scene.materials[index].name for index in scene.material_index]
-        self.assertEqual(names[:2], ["Last", "Last"])
-        self.assertEqual(set(names[2:]), {"(default)"})
-
-    def test_material_of_a_curve(self) -> None:
-        bpy.ops.object.text_add()
-        bpy.context.object.data.materials.append(self.material("Ink", (0, 0, 0)))
-        self.cube.hide_set(True)
-        scene = self.extract()
-        self.assertEqual({scene.materials[index].name for index in scene.material_index}, {"Ink"})
-
-    def test_emission_lights_the_scene(self) -> None:
-        material = self.material("Lamp", (0.5, 0.5, 0.5))
-        tree = material.node_tree
-        emission = tree.nodes.new("ShaderNodeEmission")
-        emission.inputs["Color"].default_value, emission.inputs["Strength"].default_value = (
-            (1, 0.5, 0.25, 1),
-            4,
-        )
-        tree.links.new(emission.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
-        self.cube.data.materials.append(material)
-        scene = self.extract()
-        self.assertEqual(scene.materials[scene.material_index[0]].emission, (4.0, 2.0, 1.0))
-        self.assertEqual(scene.world, (0.0, 0.0, 0.0))
-
-    def test_principled_emission(self) -> None:
-        material = self.material("Lamp", (0.5, 0.5, 0.5))
-        inputs = material.node_tree.nodes["Principled BSDF"].inputs
-        inputs["Emission Color" if "Emission Color" in inputs else "Emission"].default_value = (
-            1,
-            1,
-            0,
-            1,
-        )
-        inputs["Emission Strength"].default_value = 2
-        self.cube.data.materials.append(material)
-        self.assertEqual(self.extract().materials[1].emission, (2.0, 2.0, 0.0))
-
-    def test_mixed_shaders(self) -> None:
-        tree = self.material("Mixed", (1, 0, 0)).node_tree
-        mix, diffuse = (
-            tree.nodes.new("ShaderNodeMixShader"),
-            tree.nodes.new("ShaderNodeBsdfDiffuse"),
-        )
-        mix.inputs[0].default_value, diffuse.inputs["Color"].default_value = 0.25, (0, 1, 0, 1)
-        tree.links.new(tree.nodes["Principled BSDF"].outputs[0], mix.inputs[1])
-        tree.links.new(diffuse.outputs[0], mix.inputs[2])
-        tree.links.new(mix.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
-        self.cube.data.materials.append(bpy.data.materials["Mixed"])
-        np.testing.assert_allclose(self.extract().materials[1].base_color, (0.75, 0.25, 0))
-
-    def test_what_is_lost_is_said(self) -> None:
-        material = self.material("Mirror", (1, 1, 1))
-        material.node_tree.nodes["Principled BSDF"].inputs["Metallic"].default_value = 1
-        self.cube.data.materials.append(material)
-        self.assertTrue(
-            any("metallic" in note and "Mirror" in note for note in self.extract().notes)
-        )
+        self.assertEqual(scene.lights[1].color, (5.0, 5.0, 5.0))
+        self.assertIn("Approximated: node 'Noise Texture' by a constant: Slide.", scene.notes)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from bvh_lab.study.framing import auto_cameras
 from bvh_lab.study.plan import Plan
-from bvh_lab.study.scene import Light, Material, Scene
+from bvh_lab.study.scene import Component, Light, Material, Scene, World
 
 
 def grid_of_boxes(side: int = 4) -> tuple[np.ndarray, np.ndarray]:
@@ -32,10 +32,13 @@ def sample_scene(**changes: Any) -> Scene:
         "vertices": vertices,
         "triangles": triangles,
         "material_index": (np.arange(len(triangles)) % 2).astype(np.uint32),
-        "materials": [Material("red", (0.8, 0.1, 0.1)), Material("grey", (0.5, 0.5, 0.5))],
+        "materials": [
+            Material("red", [Component(color=(0.8, 0.1, 0.1))]),
+            Material("grey", [Component(color=(0.5, 0.5, 0.5))]),
+        ],
         "cameras": auto_cameras(vertices),
         "lights": [Light("Lamp", "point", lamp, (300.0, 300.0, 300.0), size_x=0.1)],
-        "world": (0.1, 0.1, 0.1),
+        "world": World((0.1, 0.1, 0.1)),
         "geometry": "viewport",
         "notes": ["A note of the extraction."],
     }
@@ -50,6 +53,7 @@ def small_plan(**changes: Any) -> Plan:
         "views": 2,
         "long_side": 48,
         "samples": 1,
+        "ray_long_side": 0,
         "repeats": 3,
         "build_repeats": 1,
         "judged_rays": 64,

@@ -21,7 +21,9 @@ def test_npz_keeps_its_arrays(tmp_path: Path) -> None:
     np.savez(tmp_path / "boxes.npz", vertices=vertices, triangles=triangles)
     scene = load_mesh_file(tmp_path / "boxes.npz")
     assert (scene.vertices == vertices).all() and (scene.triangles == triangles).all()
-    assert (scene.name, scene.geometry, scene.world) == ("boxes", "mesh file", (1.0, 1.0, 1.0))
+    assert (scene.name, scene.geometry) == ("boxes", "mesh file")
+    assert (scene.world.color, scene.world.texture) == ((1.0, 1.0, 1.0), None)
+    assert (scene.uvs, scene.normals, scene.textures) == (None, None, [])
     assert len(scene.cameras) == 3 and not scene.lights and len(scene.materials) == 1
     assert len(scene.notes) == 1 and "three cameras" in scene.notes[0]
 
