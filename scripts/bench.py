@@ -25,6 +25,7 @@ from bvh_lab.study.rays import choose_views, generate_rays
 from bvh_lab.study.results import KINDS, Result, Row
 from bvh_lab.study.run import compare
 from bvh_lab.study.scene import Camera, Scene
+from bvh_lab.study.spreadsheet import rows_csv
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "scenes"
 SLOW_RAYS = 20_000  # for mathutils.bvhtree, which takes one ray per Python call
@@ -74,7 +75,8 @@ def load_scene(path: Path) -> Scene:
 
 def round_seconds(row: Row, kind: str) -> list[float]:
     """Seconds of each round over all views."""
-    return [sum(views) for views in zip(*(m.seconds for m in row.of_kind(kind)), strict=True)]
+    timed = [m for measured in row.of_kind(kind).values() for m in measured]
+    return [sum(seconds) for seconds in zip(*(m.seconds for m in timed), strict=True)]
 
 
 def speed_ratios(row: Row, rival: Row, kind: str) -> list[float]:
@@ -89,7 +91,7 @@ def trace_lines(result: Result, slow: dict[str, float]) -> list[str]:
         f"Speed / Embree high robust in the same round, {result.plan.repeats} rounds: "
         "median [quartiles];",
         "wrong hits of the rays judged by brute force; nodes visited and triangles tested",
-        "per diffuse ray",
+        "per secondary ray",
         f"{'':22s}"
         + "".join(f"{kind:>20s}" for kind in KINDS)
         + "  wrong hits     nodes  triangles",
@@ -102,7 +104,9 @@ def trace_lines(result: Result, slow: dict[str, float]) -> list[str]:
         name = f"{row.label} {row.branching}-wide" if row.branching else row.label
         cells = "".join(f"{ratio_text(speed_ratios(row, robust, kind)):>20s}" for kind in KINDS)
         errors = row.errors()
-        counts = [row.per_ray(counter, "diffuse") for counter in ("node_visits", "triangle_tests")]
+        counts = [
+            row.per_ray(counter, "secondary") for counter in ("node_visits", "triangle_tests")
+        ]
         shown = "".join(
             f"{count:10.2f}" if count is not None else f"{'-':>10s}" for count in counts
         )
@@ -135,15 +139,16 @@ def mathutils_speed(scene: Scene, plan: Plan) -> dict[str, float]:
     bvh = core.build(mesh, "lbvh")
     core_scene = core.Scene(
         mesh,
-        np.full((1, 3), 0.8, np.float32),
-        np.zeros((1, 3), np.float32),
+        [core.Material([core.Component()])],
         scene.material_index,
         [],
-        scene.world,
+        core.World(scene.world),
     )
     generate_rays(core, core_scene, view, bvh, plan, core.Token())
-    speeds = {}
+    speeds: dict[str, float] = {}
     for rays in view.sets:
+        if rays.kind in speeds:  # of further bounces
+            continue
         chosen = np.random.default_rng(0).permutation(len(rays))[:SLOW_RAYS]
         origins, directions = rays.origins[chosen].tolist(), rays.directions[chosen].tolist()
         far = np.broadcast_to(np.minimum(rays.t_max, 1e30), len(rays))[chosen].tolist()
@@ -163,7 +168,7 @@ def bench(path: Path, out: Path, arguments: argparse.Namespace) -> None:
     plan.builders = arguments.builders
     plan.width, plan.height = arguments.resolution
     plan.repeats, plan.build_repeats, plan.pictures = arguments.repeats, 1, False
-    plan.judged_rays = 256
+    plan.judged_rays, plan.reorders, plan.depth = 256, ["off"], 2
     large = len(scene.triangles) > 1_000_000
     machine = describe_machine(core, f"bpy {bpy.app.version_string}")
     lines = [
@@ -185,7 +190,7 @@ def bench(path: Path, out: Path, arguments: argparse.Namespace) -> None:
     print("\n".join(traced), flush=True)
     text = "\n".join([*lines, *traced]) + "\n"
     (out / f"{path.stem}.txt").write_text(text)
-    (out / f"{path.stem}.csv").write_text(result.to_csv())
+    (out / f"{path.stem}.csv").write_text(rows_csv(result))
     (out / f"{path.stem}.json").write_text(result.to_json())
 
 

@@ -13,6 +13,7 @@ from ..study.job import Job
 from ..study.output import write_text_aside
 from ..study.report import write_report
 from ..study.run import Study
+from ..study.spreadsheet import rows_csv
 from ..study.table import text_report
 from . import images, preferences, store, summary
 from .extract import extract_scene
@@ -230,7 +231,7 @@ class BVHLAB_OT_export(bpy.types.Operator):
                 write_report(result, study.pictures, path)
             else:
                 write = {
-                    "csv": result.to_csv,
+                    "csv": lambda: rows_csv(result),
                     "json": result.to_json,
                     "txt": lambda: text_report(result),
                 }

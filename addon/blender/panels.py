@@ -110,18 +110,23 @@ class BVHLAB_PT_settings(RenderPanel, bpy.types.Panel):
         layout.use_property_decorate = False
         layout.enabled = store.running is None
         column = layout.column()
-        column.row().prop(settings, "order", expand=True)
         column.prop(settings, "device")
+        column.prop(settings, "use_reordering")
+        if settings.use_reordering:
+            column.prop(settings, "reorder_key")
         column = layout.column()
         column.row().prop(settings, "preset", expand=True)
         if settings.preset == "quick":
             sizes = column.column(align=True)
             sizes.prop(settings, "resolution")
             sizes.prop(settings, "samples")
+            sizes.prop(settings, "depth")
             sizes.prop(settings, "views")
             if settings.use_prbvh_a or settings.use_prbvh_sa:
                 sizes.prop(settings, "annealing")
         checks = layout.column(align=True)
+        if settings.preset == "quick":
+            checks.prop(settings, "ray_resolution")
         checks.prop(settings, "repeats")
         checks.prop(settings, "judged_rays")
         column = layout.column(heading="Also")

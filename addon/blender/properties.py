@@ -114,13 +114,20 @@ class BVHLAB_PG_settings(bpy.types.PropertyGroup):
     use_2: BoolProperty(name="2", description="Binary: two children a node", default=True)
     use_4: BoolProperty(name="4", description="Four children a node", default=True)
     use_8: BoolProperty(name="8", description="Eight children a node", default=True)
-    order: EnumProperty(
-        name="Ray Order",
-        description="In which order the rays are traced",
+    use_reordering: BoolProperty(
+        name="Ray Reordering",
+        description="Trace a second time with the secondary and shadow rays sorted, so that "
+        "neighbours go the same way: twice as many variants",
+        default=False,
+    )
+    reorder_key: EnumProperty(
+        name="Sort By",
+        description="What decides the order of the rays",
         items=[
-            ("off", "As Is", "Trace rays in the order of the pixels", 0),
-            ("on", "Sorted", "Sort rays first, so that neighbours go the same way", 1),
-            ("both", "Both", "Compare both: twice as many variants", 2),
+            ("aila", "Origin and Direction", "The key of the paper (Aila)", 0),
+            ("origin", "Origin", "Where rays start", 1),
+            ("octahedron", "Origin, then Direction", "Direction as a point of an octahedron", 2),
+            ("two_point", "Both Ends", "Where rays start, and where they may end", 3),
         ],
     )
     device: EnumProperty(name="Device", description="What builds and traces", items=_device_items)
@@ -137,7 +144,7 @@ class BVHLAB_PG_settings(bpy.types.PropertyGroup):
         description="How much to measure",
         items=[
             ("quick", "Quick", "Resolution and samples of your choice", 0),
-            ("paper", "Paper", "1024 x 768 pixels and three views, as in the paper", 1),
+            ("paper", "Paper", "1024 x 768 pixels, 32 samples, depth 8: takes hours", 1),
         ],
     )
     resolution: IntProperty(
@@ -152,11 +159,30 @@ class BVHLAB_PG_settings(bpy.types.PropertyGroup):
     )
     samples: IntProperty(
         name="Samples",
-        description="Samples a pixel, for the picture only: speed is measured with one ray a pixel",
+        description="Paths a pixel of the picture; speed is measured on the rays of one path",
         default=QUICK.samples,
         min=1,
         soft_max=64,
-        max=4096,
+        max=65536,
+    )
+    depth: IntProperty(
+        name="Depth",
+        description="How often light is followed on after the first surface; 0 is direct light",
+        default=QUICK.depth,
+        min=0,
+        soft_max=16,
+        max=1024,
+    )
+    ray_resolution: IntProperty(
+        name="Measured Rays",
+        description="Pixels along the longer side for which rays are traced and timed: more take "
+        "longer and spread less",
+        default=QUICK.ray_long_side,
+        min=8,
+        soft_min=64,
+        soft_max=1024,
+        max=16384,
+        subtype="PIXEL",
     )
     annealing: IntProperty(
         name="Annealing",
@@ -212,11 +238,12 @@ class BVHLAB_PG_settings(bpy.types.PropertyGroup):
         """These settings as a plan."""
         plan = Plan.from_preset(self.preset)
         plan.builders, plan.branchings = self.builders(), self.branchings()
-        plan.reorders = {"off": [False], "on": [True], "both": [False, True]}[self.order]
+        plan.reorders = ["off", self.reorder_key] if self.use_reordering else ["off"]
         plan.devices = [self.device or "cpu"]
         plan.threads = preferences.threads()
         if self.preset == "quick":
             plan.long_side, plan.samples, plan.views = self.resolution, self.samples, self.views
+            plan.depth, plan.ray_long_side = self.depth, self.ray_resolution
             for params in plan.params.values():
                 params["iterations"] = self.annealing
         plan.repeats, plan.judged_rays = self.repeats, self.judged_rays
@@ -225,7 +252,7 @@ class BVHLAB_PG_settings(bpy.types.PropertyGroup):
 
     def variants(self) -> int:
         """How many variants the settings ask for."""
-        return len(self.builders()) * len(self.branchings()) * (2 if self.order == "both" else 1)
+        return len(self.builders()) * len(self.branchings()) * (2 if self.use_reordering else 1)
 
 
 class BVHLAB_PG_row(bpy.types.PropertyGroup):
@@ -249,8 +276,8 @@ class BVHLAB_PG_panel(bpy.types.PropertyGroup):
         description="Which rays the table's speeds are of",
         items=[
             ("primary", "Primary", "Closest hit of one ray through each pixel", 0),
-            ("shadow", "Shadow", "Any hit towards a light, from where the primary rays hit", 1),
-            ("diffuse", "Diffuse", "Closest hit in random directions from the same places", 2),
+            ("secondary", "Secondary", "Closest hit of the rays that surfaces send on", 1),
+            ("shadow", "Shadow", "Any hit towards lights, from all that was hit", 2),
         ],
     )
     progress: FloatProperty(

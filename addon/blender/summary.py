@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..study.results import Result, Row, ratio
+from ..study.results import COUNTERS, KINDS, Result, Row, ratio
 from ..study.table import title
 from .notes import listed
 
@@ -100,7 +100,7 @@ def short_title(row: Row) -> str:
     words = row.label.split()
     # A rival's label holds its version: "Embree 3.13.5 robust".
     name = f"{row.label} {row.branching}" if row.branching else f"{words[0]} {words[-1]}"
-    return f"{name} sorted" if row.reorder else name
+    return name if row.reorder == "off" else f"{name} sorted"
 
 
 def sort_value(row: Row, column: str, kind: str) -> tuple[bool, float | str]:
@@ -129,13 +129,17 @@ def details(row: Row) -> list[tuple[str, str]]:
             ("Depth", f"{tree.max_depth} levels"),
             ("Memory", f"{tree.bytes / 1e6:.1f} MB"),
         ]
-    for kind in ("primary", "shadow", "diffuse"):
+    for kind in KINDS:
         if speed := row.speed(kind):
             text = f"{speed.median:.2f} MRays/s ±{speed.half_percent:.0f}%"
-            facts.append((f"{kind.title()} Rays", text))
-        visits, tests = row.per_ray("node_visits", kind), row.per_ray("triangle_tests", kind)
-        if visits is not None and tests is not None:
-            facts.append(("", f"{visits:.1f} nodes, {tests:.1f} triangles a ray"))
+            share = row.sorting_share(kind)
+            facts.append(
+                (f"{kind.title()} Rays", text + (f", {share:.0%} sorting" if share else ""))
+            )
+        work = [row.per_ray(counter, kind) for counter in COUNTERS]
+        if None not in work:
+            said = zip(work, ("nodes", "boxes", "triangles"), strict=True)
+            facts.append(("", f"{', '.join(f'{count:.1f} {name}' for count, name in said)} a ray"))
     errors = row.errors()
     facts.append(("Wrong Hits", wrong_hits(errors.wrong, errors.judged)))
     if row.threads:

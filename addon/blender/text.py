@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sentences in a panel, which does not wrap text by itself."""
+"""Sentences for the user; a panel does not wrap text by itself."""
 
 from __future__ import annotations
 
@@ -22,3 +22,11 @@ def paragraph(
     for number, line in enumerate(textwrap.wrap(sentence, max(20, int(width)))):
         lead = icon if number == 0 else "BLANK1"
         column.label(text=line, icon=lead if icon != "NONE" else "NONE")
+
+
+def sentence(error: BaseException) -> str:
+    """What a user is told of an error, in one line."""
+    text = " ".join(str(error).split())
+    if not text:
+        return "Not enough memory" if isinstance(error, MemoryError) else type(error).__name__
+    return text[0].upper() + text[1:]

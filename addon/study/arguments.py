@@ -6,9 +6,12 @@ from __future__ import annotations
 import argparse
 import math
 
-from .plan import PRESETS, Plan
+from .plan import PRESETS, REORDERS, Plan
 
-REORDERS = {"off": [False], "on": [True], "both": [False, True]}
+NUMBERS = (
+    *("samples", "depth", "shadow_rays", "ray_long_side"),
+    *("repeats", "build_repeats", "judged_rays", "seed", "threads"),
+)
 
 
 def add_plan_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,7 +24,11 @@ def add_plan_arguments(parser: argparse.ArgumentParser) -> None:
     add("--preset", choices=PRESETS, default="quick", help="where all other choices start")
     add("--builders", metavar="A,B", help=f"e.g. lbvh,sah (default: {','.join(plan.builders)})")
     add("--branching", metavar="2,4,8", help="branching factors (default: all)")
-    add("--reorder", choices=tuple(REORDERS), help="trace rays in Morton order (default: off)")
+    add(
+        "--reorder",
+        metavar="A,B",
+        help=f"sort rays before they are traced: {','.join(REORDERS)} (default: off)",
+    )
     add("--device", metavar="A,B", help="see the command devices (default: cpu)")
     add(
         "--param",
@@ -40,7 +47,22 @@ def add_plan_arguments(parser: argparse.ArgumentParser) -> None:
         "--samples",
         type=int,
         metavar="N",
-        help=f"per pixel, picture only (default: {plan.samples})",
+        help=f"per pixel of the pictures (default: {plan.samples})",
+    )
+    add("--depth", type=int, metavar="N", help=f"bounces of a path (default: {plan.depth})")
+    add(
+        "--shadow-rays",
+        type=int,
+        metavar="N",
+        help=f"towards lights from each hit (default: {plan.shadow_rays})",
+    )
+    add(
+        "--ray-resolution",
+        type=int,
+        dest="ray_long_side",
+        metavar="N",
+        help="long side of the pixels whose rays speed is measured on, 0: the pictures' "
+        f"(default: {plan.ray_long_side})",
     )
     add("--repeats", type=int, metavar="N", help=f"timed runs, 3 or more (default: {plan.repeats})")
     add(
@@ -65,7 +87,7 @@ def add_plan_arguments(parser: argparse.ArgumentParser) -> None:
 def plan_from_arguments(arguments: argparse.Namespace) -> Plan:
     """The preset with what was given on top. Raises ValueError naming the bad option."""
     plan = Plan.from_preset(arguments.preset)
-    for name in ("samples", "repeats", "build_repeats", "judged_rays", "seed", "threads"):
+    for name in NUMBERS:
         if getattr(arguments, name) is not None:
             setattr(plan, name, getattr(arguments, name))
     if arguments.memory is not None:
@@ -77,7 +99,7 @@ def plan_from_arguments(arguments: argparse.Namespace) -> Plan:
     if arguments.branching is not None:
         plan.branchings = [_integer("--branching", word) for word in _words(arguments.branching)]
     if arguments.reorder is not None:
-        plan.reorders = REORDERS[arguments.reorder]
+        plan.reorders = _words(arguments.reorder)
     if arguments.views is not None:
         words = _words(arguments.views)
         counted = len(words) == 1 and words[0].isdecimal()

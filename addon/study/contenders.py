@@ -31,14 +31,14 @@ class OurTree:
         return int(self.bvh.stats["bytes"])
 
     def trace(self, rays: RaySet, count: bool, token: Any) -> Any:
-        """The core's hits, with work counters if ``count``."""
+        """The core's hits, with work counters if ``count``. Primary rays are never sorted."""
         return self.core.trace(
             self.bvh,
             rays.origins,
             rays.directions,
             t_max=rays.t_max,
             any_hit=rays.any_hit,
-            reorder=self.row.reorder,
+            reorder=self.row.reorder if rays.kind != "primary" else "off",
             device=self.row.device,
             threads=self.plan.threads,
             count=count,
@@ -55,6 +55,9 @@ class OurTree:
             view.height,
             samples=self.plan.samples,
             seed=self.plan.seed,
+            depth=self.plan.depth,
+            shadow_rays=self.plan.shadow_rays,
+            reorder=self.row.reorder,
             threads=self.plan.threads,
             token=token,
         )
@@ -161,7 +164,7 @@ def embree_row(core: ModuleType, mode: EmbreeMode, plan: Plan) -> Row:
     embree = core.embree()
     version = f" {embree['version']}" if embree["available"] else ""
     label = f"Embree{version} {'robust' if mode.robust else 'fast'}"
-    row = Row(mode.name, label, "embree", f"embree_{mode.quality}", 0, False, "cpu")
+    row = Row(mode.name, label, "embree", f"embree_{mode.quality}", 0, "off", "cpu")
     row.threads = plan.threads or usable_cores()
     if not embree["available"]:
         row.error = f"Embree is missing: {embree['reason']}; leave it out with --no-embree"

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from .machine import usable_cores
 from .plan import Plan
-from .rays import View
+from .rays import View, most_rays
 from .results import KINDS, Row
 
 # One binary tree and its collapse to three branching factors, on two cores.
@@ -31,6 +31,7 @@ BUILD_SECONDS_PER_MILLION = {
     "embree": 1.5,
 }
 TRACE_SECONDS_PER_MILLION = 0.5
+SHADING = 1.5  # what a picture takes, in times of tracing its rays
 JUDGE_SECONDS_PER_TEST = 6e-9  # one brute-force ray against one triangle on one core
 
 
@@ -46,27 +47,33 @@ class Estimate:
         """One build; ``builder`` may be "embree"."""
         return 1e-6 * self.triangles * BUILD_SECONDS_PER_MILLION.get(builder, 5.0)
 
-    def trace(self, view: View) -> float:
-        """One kind of ray, traced once."""
-        return 1e-6 * view.pixels * TRACE_SECONDS_PER_MILLION
+    def trace(self, rays: int) -> float:
+        """Rays traced once."""
+        return 1e-6 * rays * TRACE_SECONDS_PER_MILLION
 
-    def render(self, view: View) -> float:
-        """One picture: a primary and a shadow ray per sample."""
-        return 2.0 * self.plan.samples * self.trace(view)
+    def view(self, view: View) -> dict[str, float]:
+        """One run of all rays of a view, and one picture of it, per category.
+
+        The rays are those that are there, or before that as many as there can be.
+        """
+        rays = sum(len(rays) for rays in view.sets) or sum(most_rays(view, self.plan).values())
+        paths = self.plan.samples * view.width * view.height / view.rays
+        return {"trace": self.trace(rays), "render": SHADING * paths * self.trace(rays)}
 
     def judge(self) -> float:
-        """Brute force for one kind of ray in one view."""
+        """Brute force for one kind of ray, all bounces, in one view."""
         return self.plan.judged_rays * self.triangles * JUDGE_SECONDS_PER_TEST / usable_cores()
 
-    def measure(self, row: Row) -> dict[str, float]:
-        """Everything that one built row takes, per category."""
+    def measure(self, row: Row, views: Sequence[View] | None = None) -> dict[str, float]:
+        """Everything that one built row takes, per category, in all views or these."""
         ours = row.system == "bvh_lab"
         runs = self.plan.repeats + (2 if ours else 1)  # warm-up, and counters for ours
-        traces = len(KINDS) * runs * sum(self.trace(view) for view in self.views)
-        renders = (
-            sum(self.render(view) for view in self.views) if ours and self.plan.pictures else 0.0
-        )
-        return {"trace": traces, "render": renders}
+        pictures = 1 if ours and self.plan.pictures else 0
+        once = [self.view(view) for view in views or self.views]
+        return {
+            "trace": runs * sum(part["trace"] for part in once),
+            "render": pictures * sum(part["render"] for part in once),
+        }
 
     def planned(self, rows: Iterable[Row], builds: Iterable[str]) -> dict[str, float]:
         """The whole study, per category; ``builds`` names a builder for each tree."""

@@ -162,6 +162,9 @@ def _facts(result: Result) -> str:
         "Preset": plan.preset,
         "Builder settings": str(plan.params or "defaults"),
         "Resolution": f"{plan.width}x{plan.height} pixels" if plan.width else along,
+        "Paths": f"{plan.samples} samples a pixel, depth {plan.depth}, {plan.shadow_rays} shadow "
+        "rays a hit",
+        "Renderer's features": ", ".join(scene.features) or "none",
         "Seed": str(plan.seed),
         "Measured": f"{result.started}, {result.seconds:.0f} s in all",
         "Scene file": scene.source or "not saved",

@@ -14,6 +14,7 @@ from .records import from_plain
 
 BRANCHINGS = (2, 4, 8)
 PRESETS = ("quick", "paper")
+REORDERS = ("off", "aila", "origin", "octahedron", "two_point")  # of rays, as in core.trace
 
 # The paper's ten, in its order, and those beyond it.
 BUILDERS = (
@@ -47,15 +48,15 @@ class Variant:
 
     builder: str
     branching: int
-    reorder: bool
+    reorder: str
     device: str
 
     @property
     def name(self) -> str:
-        """Name for files and look-up, e.g. "sbvh_8" or "sbvh_8_reordered"."""
+        """Name for files and look-up, e.g. "sbvh_8" or "sbvh_8_aila"."""
         parts = [self.builder, str(self.branching)]
-        if self.reorder:
-            parts.append("reordered")
+        if self.reorder != "off":
+            parts.append(self.reorder)
         if self.device != "cpu":
             parts.append("".join(c if c.isalnum() else "-" for c in self.device))
         return "_".join(parts)
@@ -65,9 +66,15 @@ class Variant:
 class Plan:
     """Every choice of a study. `check` names the first bad one.
 
-    ``views`` is a number of cameras (the first ones of the scene) or their names. ``width`` and
-    ``height`` are pixels; 0 for both means ``long_side`` along the longer side of each camera.
-    ``samples`` per pixel are for the picture only: speed is measured with one ray per pixel.
+    ``reorders`` are of `REORDERS`: how secondary and shadow rays are sorted before they are traced.
+    ``views`` is a number of cameras (the first ones of the scene) or their names.
+
+    Pictures have ``width`` x ``height`` pixels, 0 for both meaning ``long_side`` along the longer
+    side of each camera, and ``samples`` paths a pixel. Paths go on ``depth`` times after their
+    first hit and send ``shadow_rays`` rays towards lights from each hit. Speed is measured on the
+    rays of one path for each pixel of a picture whose longer side has ``ray_long_side`` pixels (0:
+    as in the picture).
+
     ``repeats`` counts the timed runs after one warm-up; ``build_repeats`` the timed builds.
     ``judged_rays`` are compared with brute force for each view and kind of ray. ``memory_gib``
     bounds the trees held at once (0: half of what is free at the start). ``threads`` 0 means all.
@@ -76,17 +83,20 @@ class Plan:
     preset: str = "quick"
     builders: list[str] = field(default_factory=lambda: list(BUILDERS))
     branchings: list[int] = field(default_factory=lambda: list(BRANCHINGS))
-    reorders: list[bool] = field(default_factory=lambda: [False])
+    reorders: list[str] = field(default_factory=lambda: ["off"])
     devices: list[str] = field(default_factory=lambda: ["cpu"])
     params: dict[str, dict[str, float]] = field(default_factory=lambda: deepcopy(QUICK_PARAMS))
     views: int | list[str] = 3
-    long_side: int = 384
+    long_side: int = 256
     width: int = 0
     height: int = 0
-    samples: int = 2
+    samples: int = 1
+    depth: int = 2
+    shadow_rays: int = 2
+    ray_long_side: int = 160
     pictures: bool = True
     embree: bool = True
-    repeats: int = 3
+    repeats: int = 5
     build_repeats: int = 3
     judged_rays: int = 512
     seed: int = 0
@@ -99,25 +109,45 @@ class Plan:
     def from_preset(cls, preset: str) -> Plan:
         """The plan of a preset: "quick" (the default) or "paper".
 
-        "paper" takes what of Meister & Bittner 2022 applies to this version: 1024 x 768 pixels,
-        three views, c_T = 3, c_I = 2 and the builders' settings: their defaults, without a limit
-        on duplicated references.
+        "paper" is Meister & Bittner 2022, section 4: 1024 x 768 pixels, 32 samples, depth 8 with
+        two shadow rays a hit, three views, with and without reordering, c_T = 3, c_I = 2 and the
+        builders' settings: their defaults, without a limit on duplicated references.
         """
         if preset not in PRESETS:
             raise ValueError(f"unknown preset {preset!r}; there are: {', '.join(PRESETS)}")
-        if preset == "paper":
-            return cls(preset="paper", width=1024, height=768, params=deepcopy(PAPER_PARAMS))
-        return cls()
+        if preset == "quick":
+            return cls()
+        return cls(
+            preset="paper",
+            reorders=["off", "aila"],
+            params=deepcopy(PAPER_PARAMS),
+            width=1024,
+            height=768,
+            samples=32,
+            depth=8,
+            ray_long_side=0,
+        )
 
     def preset_note(self) -> str:
         """What the preset means, in a sentence for the report."""
+        side = f"{self.ray_long_side} pixels along the longer side"
         if self.preset == "paper":
-            return (
-                "Preset paper: 1024x768, three views, c_T = 3, c_I = 2 and the paper's builder "
-                "settings; the paper's path tracing is not part of this version, so shadow and "
-                "random diffuse rays start at the primary hits only."
+            note = (
+                "Preset paper: 1024x768 pixels, 32 samples, depth 8, two shadow rays a hit, no "
+                "Russian roulette, three views, c_T = 3, c_I = 2 and the paper's builder settings, "
+                "but for what was set otherwise."
             )
-        note = "Preset quick: less resolution and fewer samples than the paper's 1024x768 and 32."
+        else:
+            long_side = f"{self.long_side} pixels along the longer side"
+            size = f"{self.width}x{self.height} pixels" if self.width else long_side
+            note = (
+                f"Preset quick: pictures of {size}, samples {self.samples} and depth {self.depth}, "
+                "where the paper has 1024x768, 32 and 8."
+            )
+        where = f"a picture of {side}" if self.ray_long_side else "the picture"
+        note += f" Speed is measured on the rays of one path for each pixel of {where}."
+        if self.preset == "paper":
+            return note
         for builder in self.builders:
             if builder in QUICK_PARAMS and "iterations" in self.params.get(builder, {}):
                 iterations = self.params[builder]["iterations"]
@@ -159,6 +189,9 @@ class Plan:
         for branching in self.branchings:
             if branching not in BRANCHINGS:
                 raise ValueError(f"branching {branching} is not known; it is 2, 4 or 8")
+        for reorder in self.reorders:
+            if reorder not in REORDERS:
+                raise ValueError(f"unknown reorder {reorder!r}; there are: {', '.join(REORDERS)}")
         if self.preset not in PRESETS:
             raise ValueError(f"unknown preset {self.preset!r}; there are: {', '.join(PRESETS)}")
         if isinstance(self.views, list) and not self.views:
@@ -173,7 +206,11 @@ class Plan:
         if self.width:
             _within("width", self.width, 8, 16384)
             _within("height", self.height, 8, 16384)
-        _within("samples", self.samples, 1, 4096)
+        if self.ray_long_side:
+            _within("ray_long_side", self.ray_long_side, 8, 16384)
+        _within("samples", self.samples, 1, 65536)
+        _within("depth", self.depth, 0, 1024)
+        _within("shadow_rays", self.shadow_rays, 0, 64)
         _within("repeats", self.repeats, 3, 1000)
         _within("build_repeats", self.build_repeats, 1, 1000)
         _within("judged_rays", self.judged_rays, 0, 1_000_000)
@@ -189,8 +226,15 @@ class Plan:
 
     @classmethod
     def from_json(cls, text: str) -> Plan:
-        """The plan that `to_json` wrote; raises ValueError naming a bad field."""
-        return from_plain(cls, json.loads(text))
+        """The plan that `to_json` wrote; raises ValueError naming a bad field.
+
+        In ``reorders``, false and true mean "off" and "aila": that is how it was once written.
+        """
+        plain = json.loads(text)
+        if isinstance(plain, dict) and isinstance(reorders := plain.get("reorders"), list):
+            named = {False: "off", True: "aila"}
+            plain["reorders"] = [named[r] if isinstance(r, bool) else r for r in reorders]
+        return from_plain(cls, plain)
 
 
 def _within(name: str, value: float, low: float, high: float) -> None:

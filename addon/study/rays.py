@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any
@@ -10,21 +11,25 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from .core_scene import core_camera
 from .judge import Answers, Judge
+from .machine import free_bytes
 from .plan import Plan
-from .results import KINDS
 from .scene import Camera, Float32Array, Scene
+
+BYTES_PER_RAY = 45  # origin, direction, t_max and the reference's answer
 
 
 @dataclass
 class RaySet:
-    """Rays of one kind with what they should meet.
+    """Rays of one kind and bounce, traced together, with what they should meet.
 
     ``t_max`` is a scalar or (N,) float32; ``reference`` holds the reference variant's answers,
     ``sampled`` the indices of the rays that brute force judged and ``judge`` its answers.
     """
 
     kind: str
+    bounce: int
     origins: Float32Array
     directions: Float32Array
     t_max: float | Float32Array
@@ -37,6 +42,11 @@ class RaySet:
         """Whether the first hit found answers the ray."""
         return self.kind == "shadow"
 
+    @property
+    def name(self) -> str:
+        """E.g. "secondary rays 2", those of the second bounce."""
+        return "primary rays" if self.kind == "primary" else f"{self.kind} rays {self.bounce}"
+
     def __len__(self) -> int:
         return len(self.origins)
 
@@ -45,20 +55,24 @@ class RaySet:
 class View:
     """One camera with its picture size and, once prepared, its rays.
 
-    A kind without rays is absent from ``sets``.
+    ``ray_camera`` frames the same as ``camera`` for ``ray_width`` x ``ray_height`` pixels, of which
+    the rays are that speed is measured on. Kinds and bounces without rays are absent from ``sets``.
     """
 
     name: str
     camera: Any  # core.Camera
     width: int
     height: int
+    ray_camera: Any
+    ray_width: int
+    ray_height: int
     sets: list[RaySet] = field(default_factory=list)
     picture: Float32Array | None = None  # the reference variant's, (H, W, 3)
 
     @property
-    def pixels(self) -> int:
-        """Number of pixels, and so of primary rays."""
-        return self.width * self.height
+    def rays(self) -> int:
+        """Number of primary rays."""
+        return self.ray_width * self.ray_height
 
 
 def choose_views(core: ModuleType, scene: Scene, plan: Plan) -> list[View]:
@@ -74,17 +88,55 @@ def choose_views(core: ModuleType, scene: Scene, plan: Plan) -> list[View]:
             if name not in by_name:
                 raise ValueError(f"unknown view {name!r}; there are: {', '.join(by_name)}")
         chosen = [by_name[name] for name in plan.views]
-    return [_view(core, camera, plan) for camera in chosen]
+    views = [_view(core, camera, plan) for camera in chosen]
+    _check_memory(views, plan)
+    return views
 
 
 def _view(core: ModuleType, camera: Camera, plan: Plan) -> View:
     width, height = plan.width, plan.height
     if not width:
-        scale = plan.long_side / max(camera.aspect, 1.0)
-        width, height = (max(1, round(scale * camera.aspect)), max(1, round(scale)))
-    window = fit_window(camera.window, width / height)
-    made = core.Camera(camera.kind, camera.to_world, window, camera.clip_start)
-    return View(camera.name, made, width, height)
+        width, height = _size(plan.long_side, camera.aspect)
+    ray_width, ray_height = width, height
+    if plan.ray_long_side:
+        ray_width, ray_height = _size(plan.ray_long_side, width / height)
+
+    def framed(width: int, height: int) -> Any:
+        return core_camera(core, camera, fit_window(camera.window, width / height))
+
+    return View(
+        camera.name,
+        framed(width, height),
+        width,
+        height,
+        framed(ray_width, ray_height),
+        ray_width,
+        ray_height,
+    )
+
+
+def _size(long_side: int, aspect: float) -> tuple[int, int]:
+    scale = long_side / max(aspect, 1.0)
+    return max(1, round(scale * aspect)), max(1, round(scale))
+
+
+def most_rays(view: View, plan: Plan) -> dict[str, int]:
+    """How many rays of each kind the view can have: as many as if no path ended early."""
+    return {
+        "primary": view.rays,
+        "secondary": view.rays * plan.depth,
+        "shadow": view.rays * plan.shadow_rays * (plan.depth + 1),
+    }
+
+
+def _check_memory(views: Sequence[View], plan: Plan) -> None:
+    """Raise ValueError where the rays may not fit; the rays of all views are held at once."""
+    needed = BYTES_PER_RAY * sum(sum(most_rays(view, plan).values()) for view in views)
+    if needed > (free := free_bytes()):
+        raise ValueError(
+            f"the rays to be traced may take {needed / 2**30:.1f} GiB and {free / 2**30:.1f} GiB "
+            "are free; choose a lower resolution, less depth or fewer views"
+        )
 
 
 def fit_window(
@@ -99,54 +151,40 @@ def fit_window(
     return (middle - half, middle + half, bottom, top)
 
 
-def core_scene(core: ModuleType, mesh: Any, scene: Scene) -> Any:
-    """The scene as `core.Scene`, on a `core.Mesh` of its triangles; ValueError for a bad one."""
-    lights = [
-        core.Light(
-            light.kind,
-            light.to_world,
-            light.color,
-            size_x=light.size_x,
-            size_y=light.size_y,
-            shape=light.shape,
-            spot_angle=light.spot_angle,
-            spot_blend=light.spot_blend,
-        )
-        for light in scene.lights
-    ]
-    base_color = np.array([m.base_color for m in scene.materials], dtype=np.float32).reshape(-1, 3)
-    emission = np.array([m.emission for m in scene.materials], dtype=np.float32).reshape(-1, 3)
-    return core.Scene(mesh, base_color, emission, scene.material_index, lights, scene.world)
-
-
 def generate_rays(
     core: ModuleType, scene: Any, view: View, bvh: Any, plan: Plan, token: Any
 ) -> None:
-    """Fill ``view.sets``: primary rays, and shadow and random diffuse rays from their hits.
+    """Fill ``view.sets`` with what the path tracer traces for one path of each pixel.
 
-    ``scene`` is a `core.Scene`; ``bvh`` supplies the primary hits, and every variant would give the
-    same ones. Misses start no rays.
+    ``scene`` is a `core.Scene`; ``bvh`` supplies the hits, and every variant would give the same
+    ones. Paths that have ended have no rays.
     """
-    origins, directions = core.camera_rays(
-        view.camera, view.width, view.height, seed=plan.seed, threads=plan.threads
+    paths = core.path_rays(
+        bvh,
+        scene,
+        view.ray_camera,
+        view.ray_width,
+        view.ray_height,
+        depth=plan.depth,
+        shadow_rays=plan.shadow_rays,
+        seed=plan.seed,
+        threads=plan.threads,
+        token=token,
     )
-    hit = core.trace(bvh, origins, directions, threads=plan.threads, token=token)
-    shadow = core.shadow_rays(scene, origins, directions, hit, seed=plan.seed)
-    diffuse = core.diffuse_rays(scene, origins, directions, hit, seed=plan.seed)
-    sets = [
-        RaySet("primary", origins, directions, float("inf")),
-        RaySet("shadow", shadow[0], shadow[1], t_max=shadow[2]),
-        RaySet("diffuse", diffuse[0], diffuse[1], float("inf")),
-    ]
-    assert tuple(rays.kind for rays in sets) == KINDS
+    infinity = float("inf")
+    closest = [("primary", 0, paths.primary)]
+    closest += [("secondary", i, rays) for i, rays in enumerate(paths.secondary, start=1)]
+    sets = [RaySet(kind, bounce, rays[0], rays[1], infinity) for kind, bounce, rays in closest]
+    for bounce, (origins, directions, t_max) in enumerate(paths.shadow):
+        sets.append(RaySet("shadow", bounce, origins, directions, t_max))
     view.sets = [rays for rays in sets if len(rays)]
 
 
 def judge_rays(
-    core: ModuleType, mesh: Any, rays: RaySet, plan: Plan, seed: int, token: Any
+    core: ModuleType, mesh: Any, rays: RaySet, wanted: int, plan: Plan, seed: int, token: Any
 ) -> None:
-    """Ask brute force in double precision about a seeded sample of the rays."""
-    count = min(plan.judged_rays, len(rays))
+    """Ask brute force in double precision about a seeded sample of ``wanted`` of the rays."""
+    count = min(wanted, len(rays))
     chosen = np.random.default_rng([plan.seed, seed]).choice(len(rays), count, replace=False)
     rays.sampled = np.sort(chosen)
     origins, directions = rays.origins[rays.sampled], rays.directions[rays.sampled]

@@ -44,11 +44,16 @@ def measuring_notes(plan: Plan, groups: int, slow_builds: Sequence[str]) -> list
 
 
 def missing_ray_notes(result: Result, views: Sequence[View]) -> list[str]:
-    """Views without a kind of ray."""
+    """Views without a kind of ray that the plan asks for."""
     notes = []
+    plan = result.plan
+    wanted = {"primary": True, "secondary": plan.depth > 0, "shadow": plan.shadow_rays > 0}
     for view in views:
-        missing = set(KINDS) - {rays.kind for rays in view.sets}
+        there = {rays.kind for rays in view.sets}
+        missing = [kind for kind in KINDS if wanted[kind] and kind not in there]
         if result.reference and not result.cancelled and missing:
-            kinds = " and ".join(sorted(missing))
-            notes.append(f"View {view.name} has no {kinds} rays: no primary ray hit anything.")
+            kinds = " and ".join(missing)
+            notes.append(
+                f"View {view.name} has no {kinds} rays: nothing was hit that sends any there."
+            )
     return notes

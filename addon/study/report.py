@@ -15,6 +15,7 @@ from .judge import picture_difference
 from .output import file_stems, publish_folder, staged_folder
 from .results import Result
 from .scene import Float32Array
+from .spreadsheet import rays_csv, rows_csv
 from .table import text_report
 
 PICTURES = "pictures"
@@ -22,7 +23,7 @@ Pictures = Mapping[tuple[str, str], Float32Array]  # (variant name, view name) -
 
 
 def write_report(result: Result, pictures: Pictures, out: Path) -> None:
-    """Write table.txt, results.csv, results.json, index.html and pictures/ into the folder ``out``.
+    """Write tables (txt, csv), results.json, index.html and pictures/ into the folder ``out``.
 
     Everything is written into a new folder beside it and renamed at the end. Raises OSError.
     """
@@ -36,7 +37,8 @@ def fill_report(result: Result, pictures: Pictures, folder: Path) -> None:
     files = write_pictures(result, pictures, folder) if pictures else {}
     texts = {
         "table.txt": text_report(result),
-        "results.csv": result.to_csv(),
+        "results.csv": rows_csv(result),
+        "rays.csv": rays_csv(result),
         "results.json": result.to_json(),
         "index.html": html_page(result, files, folder),
     }

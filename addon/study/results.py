@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
@@ -14,8 +12,9 @@ import numpy as np
 from .plan import Plan
 from .records import from_plain
 
-KINDS = ("primary", "shadow", "diffuse")  # of rays: camera, any hit towards lights, cosine-weighted
-FORMAT = 1  # of results.json
+KINDS = ("primary", "secondary", "shadow")  # of rays: from the camera, from a hit on, to lights
+COUNTERS = ("node_visits", "box_tests", "triangle_tests")
+FORMAT = 2  # of results.json
 
 
 class Spread(NamedTuple):
@@ -69,22 +68,27 @@ class Errors:
 
 @dataclass
 class Measurement:
-    """One variant, one view, one kind of ray.
+    """One variant, one view, one kind of ray, one bounce: rays that are traced together.
 
+    ``bounce`` counts from the camera: primary rays and the shadow rays from what they hit have 0,
+    the secondary rays from there 1. ``rays`` are those traced; there are no dead ones.
     ``key_seconds``, ``sort_seconds`` and ``traverse_seconds`` have one entry per timed repeat;
-    generating the rays is in none of them. ``node_visits`` and ``triangle_tests`` are sums over
-    ``rays``, from a run of their own (None where there are no counters). ``hits_sha256`` is the
-    hash of all answers, ``differing_rays`` how many differ from the reference variant's.
+    generating the rays is in none of them. ``node_visits``, ``box_tests`` and ``triangle_tests``
+    are sums over ``rays``, from a run of their own (None where there are no counters).
+    ``hits_sha256`` is the hash of all answers, ``differing_rays`` how many differ from the
+    reference variant's.
     """
 
     view: str
     kind: str
     rays: int
+    bounce: int = 0
     hits: int = 0
     hits_sha256: str = ""
     differing_rays: int = 0
     errors: Errors = field(default_factory=Errors)
     node_visits: int | None = None
+    box_tests: int | None = None
     triangle_tests: int | None = None
     key_seconds: list[float] = field(default_factory=list)
     sort_seconds: list[float] = field(default_factory=list)
@@ -96,20 +100,41 @@ class Measurement:
         parts = zip(self.key_seconds, self.sort_seconds, self.traverse_seconds, strict=True)
         return [sum(part) for part in parts]
 
+    @property
+    def sorting_seconds(self) -> list[float]:
+        """Seconds of each repeat that finding the order took: keys and sort."""
+        parts = zip(self.key_seconds, self.sort_seconds, strict=True)
+        return [sum(part) for part in parts]
+
+
+def mrays_per_second(timed: list[Measurement]) -> Spread:
+    """Rays of all bounces over their seconds, from measurements of one view and kind.
+
+    The median and quartiles are those of the repeats that all have; ``low`` is from the slow ones.
+    """
+    mega_rays = 1e-6 * sum(m.rays for m in timed)
+    repeats = zip(*(m.seconds for m in timed), strict=False)
+    fast, median, slow = spread([sum(seconds) for seconds in repeats])
+    return Spread(*(mega_rays / max(seconds, 1e-9) for seconds in (slow, median, fast)))
+
 
 @dataclass
 class Picture:
     """How one variant's picture of one view compares with the reference variant's.
 
-    ``largest_difference`` is over all pixels and channels, linear; 0 means equal pixel for pixel.
+    ``sha256`` is the hash of all pixels, float32. ``largest_difference`` is over all pixels and
+    channels, linear; 0 means equal pixel for pixel. ``rays`` counts all that were traced for it, by
+    kind; ``trace_seconds`` is the part of ``seconds`` that tracing them took.
     """
 
     view: str
     width: int
     height: int
     samples: int
-    rays: int
+    rays: dict[str, int]
     seconds: float
+    trace_seconds: float
+    sha256: str
     largest_difference: float
     differing_pixels: int
 
@@ -149,7 +174,7 @@ class Row:
     system: str
     builder: str
     branching: int
-    reorder: bool
+    reorder: str  # of plan.REORDERS
     device: str
     threads: int = 0
     group: int = 1
@@ -161,29 +186,52 @@ class Row:
     measurements: list[Measurement] = field(default_factory=list)
     pictures: list[Picture] = field(default_factory=list)
 
-    def of_kind(self, kind: str) -> list[Measurement]:
-        """The measurements of one kind of ray that have been timed, one per view."""
-        return [m for m in self.measurements if m.kind == kind and m.traverse_seconds]
+    def add_times(self, view: str, kind: str, bounce: int, hits: Any) -> None:
+        """Append one repeat's seconds, of what `core.trace` returned, to its measurement."""
+        for measurement in self.measurements:
+            if (measurement.view, measurement.kind, measurement.bounce) == (view, kind, bounce):
+                measurement.key_seconds.append(hits.key_seconds)
+                measurement.sort_seconds.append(hits.sort_seconds)
+                measurement.traverse_seconds.append(hits.traverse_seconds)
+
+    def of_kind(self, kind: str) -> dict[str, list[Measurement]]:
+        """The measurements of one kind of ray by view, where all bounces have been timed."""
+        views: dict[str, list[Measurement]] = {}
+        for measurement in self.measurements:
+            if measurement.kind == kind:
+                views.setdefault(measurement.view, []).append(measurement)
+        return {
+            view: measured
+            for view, measured in views.items()
+            if all(m.traverse_seconds for m in measured)
+        }
+
+    def view_speeds(self, kind: str) -> dict[str, Spread]:
+        """MRays/s by view: rays of all bounces over their seconds, median and quartiles."""
+        return {view: mrays_per_second(timed) for view, timed in self.of_kind(kind).items()}
 
     def speed(self, kind: str) -> Spread | None:
-        """MRays/s over all views: rays / sum of each view's median seconds; None if not measured.
+        """MRays/s: the arithmetic mean over views, as in the paper; None if not measured.
 
-        The spread takes the sums of the views' quartiles, so ``low`` is from the slow ones.
+        Median and quartiles are each the mean of the views'.
         """
-        timed = self.of_kind(kind)
-        if not timed:
+        speeds = list(self.view_speeds(kind).values())
+        if not speeds:
             return None
-        mega_rays = 1e-6 * sum(m.rays for m in timed)
-        spreads = [spread(m.seconds) for m in timed]
-        fast, median, slow = (sum(s[i] for s in spreads) for i in range(3))
-        return Spread(*(mega_rays / max(seconds, 1e-9) for seconds in (slow, median, fast)))
+        return Spread(*(sum(part) / len(speeds) for part in zip(*speeds, strict=True)))
+
+    def sorting_share(self, kind: str) -> float | None:
+        """Part of the median time, over all views, that went into sort keys and sorting."""
+        timed = [m for measured in self.of_kind(kind).values() for m in measured]
+        whole = sum(spread(m.seconds).median for m in timed)
+        return sum(spread(m.sorting_seconds).median for m in timed) / whole if whole else None
 
     def build(self) -> Spread | None:
         """Seconds of building; None if not built."""
         return spread(self.build_seconds) if self.build_seconds else None
 
     def per_ray(self, counter: str, kind: str) -> float | None:
-        """``counter`` ("node_visits" or "triangle_tests") per ray over all views, or None."""
+        """``counter`` (of `COUNTERS`) per ray over all views and bounces, or None."""
         counted = [m for m in self.measurements if m.kind == kind]
         counts = [getattr(m, counter) for m in counted]
         rays = sum(m.rays for m in counted)
@@ -214,7 +262,10 @@ class Row:
 
 @dataclass
 class Subject:
-    """The scene that was measured. ``geometry`` is "viewport", "render" or "mesh file"."""
+    """The scene that was measured. ``geometry`` is "viewport", "render" or "mesh file".
+
+    ``features`` names what of the renderer it uses, in the words of `core.Scene.features`.
+    """
 
     name: str
     source: str
@@ -226,6 +277,7 @@ class Subject:
     lights: int
     views: list[str]
     sha256: str
+    features: list[str] = field(default_factory=list)
 
 
 @dataclass
@@ -271,6 +323,14 @@ class Result:
                 return row
         raise ValueError(f"no row {name!r}; there are: {', '.join(r.name for r in self.rows)}")
 
+    def rays(self) -> dict[tuple[str, int], int]:
+        """How many rays of all views were traced, by kind and bounce."""
+        counts: dict[tuple[str, int], int] = {}
+        row = max(self.rows, key=lambda row: len(row.measurements), default=None)
+        for m in row.measurements if row else []:
+            counts[m.kind, m.bounce] = counts.get((m.kind, m.bounce), 0) + m.rays
+        return dict(sorted(counts.items(), key=lambda item: (KINDS.index(item[0][0]), item[0][1])))
+
     def to_json(self) -> str:
         """JSON text, with every repeat, that `from_json` reads back into an equal result."""
         return json.dumps(asdict(self), indent=1, allow_nan=False, ensure_ascii=False)
@@ -283,52 +343,8 @@ class Result:
             raise ValueError(f"results of format {plain.get('format')!r}; this reads {FORMAT}")
         return from_plain(cls, plain)
 
-    def to_csv(self) -> str:
-        """One line per row, units in the column names, empty where there is no value."""
-        out = io.StringIO()
-        nothing = Row("", "", "", "", 0, False, "")
-        writer = csv.DictWriter(out, csv_record(nothing).keys(), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(csv_record(row) for row in self.rows)
-        return out.getvalue()
-
 
 def ratio(row: Row, baseline: Row, kind: str) -> float | None:
     """Speed of ``row`` over that of ``baseline`` for one kind of ray, or None."""
     ours, theirs = row.speed(kind), baseline.speed(kind)
     return ours.median / theirs.median if ours and theirs and theirs.median else None
-
-
-def csv_record(row: Row) -> dict[str, Any]:
-    """The row's line of the CSV file: column name to value, None where there is none."""
-    tree = asdict(row.tree) if row.tree else {}
-    errors = row.errors()
-    names = ("name", "label", "system", "builder", "branching", "reorder", "device", "threads")
-    record: dict[str, Any] = {name: getattr(row, name) for name in names}
-    for name in (
-        "nodes",
-        "leaves",
-        "references",
-        "max_depth",
-        "average_leaf_size",
-        "bytes",
-        "cost",
-    ):
-        record[name] = tree.get(name)
-    for name in ("build_seconds", "tree_seconds", "collapse_seconds"):
-        seconds = getattr(row, name)
-        record[name] = spread(seconds).median if seconds else None
-    for kind in KINDS:
-        speed = row.speed(kind)
-        for i, part in enumerate(("_low", "", "_high")):
-            record[f"{kind}_mrays_per_second{part}"] = speed[i] if speed else None
-    for counter in ("node_visits", "triangle_tests"):
-        for kind in KINDS:
-            record[f"{kind}_{counter}_per_ray"] = row.per_ray(counter, kind)
-    for name in ("judged", "wrong", "false_misses", "false_hits", "wrong_triangles"):
-        record[f"{name}_rays"] = getattr(errors, name)
-    record["largest_relative_t_error"] = errors.largest_t_error
-    record["differing_rays"] = row.differing_rays()
-    record["largest_picture_difference"] = row.picture_difference()
-    record["error"] = row.error
-    return record

@@ -9,6 +9,7 @@ groups, one after the other, and the result says so.
 from __future__ import annotations
 
 import copy
+import hashlib
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -32,15 +33,17 @@ from .contenders import (
     record_build,
     tree_jobs,
 )
+from .core_scene import core_scene
 from .estimate import Estimate
 from .judge import Answers, Judge, differing_rays, picture_difference
 from .machine import describe_machine, free_bytes
 from .plan import Plan
 from .progress import Event, Progress, RowChanged, Step
-from .rays import RaySet, View, choose_views, core_scene, generate_rays, judge_rays
+from .rays import RaySet, View, choose_views, generate_rays, judge_rays
 from .remarks import SLOW_BUILD_SECONDS, iteration_notes, measuring_notes, missing_ray_notes
-from .results import Measurement, Picture, Result, Row, Subject
+from .results import COUNTERS, Measurement, Picture, Result, Row, Subject
 from .scene import Float32Array, Scene
+from .table import title
 
 __all__ = ["Event", "RowChanged", "Step", "Study", "compare"]
 
@@ -86,7 +89,7 @@ class _Runner:
     ) -> None:
         self.core, self.plan, self.token, self.emit = core, plan, token, emit
         self.mesh = core.Mesh(scene.vertices, scene.triangles)
-        self.scene = core_scene(core, self.mesh, scene)
+        self.scene, texture_notes = core_scene(core, self.mesh, scene)
         self.views = choose_views(core, scene, plan)
         self.jobs = tree_jobs(core, plan)
         self.modes = EMBREE_MODES if plan.embree else ()
@@ -95,15 +98,16 @@ class _Runner:
         self.guess = Estimate(plan, len(scene.triangles), self.views)
         rows = [row for job in self.jobs for row in job.all_rows()]
         rows += [embree_row(core, mode, plan) for mode in self.modes]
+        self.planned_rows = rows
         builds = [job.builder for job in self.jobs] + ["embree"] * len(self.modes)
         self.progress = Progress(self.guess.planned(rows, builds), emit)
         self.study = Study(
             Result(
                 plan=copy.deepcopy(plan),
-                subject=_subject(scene, self.views),
+                subject=_subject(scene, self.scene, self.views),
                 machine=describe_machine(core, host),
                 started=datetime.now(UTC).isoformat(timespec="seconds"),
-                notes=[plan.preset_note(), *scene.notes],
+                notes=[plan.preset_note(), *scene.notes, *texture_notes],
             )
         )
 
@@ -241,13 +245,19 @@ class _Runner:
     def _prepare(self, view: View, tree: OurTree) -> bool:
         """Generate the view's rays with one tree; False where that failed (its row says why)."""
         with self._failing_alone([tree.row]):
+            before = [self.guess.measure(row, [view]) for row in self.planned_rows]
             with self.progress.step("trace", 0.0, f"generating the rays of view {view.name}"):
                 generate_rays(self.core, self.scene, view, tree.bvh, self.plan, self.token)
+            for row, most in zip(self.planned_rows, before, strict=True):
+                there = self.guess.measure(row, [view])
+                self.progress.skip({name: most[name] - there[name] for name in most})
             for number, rays in enumerate(view.sets):
-                stage = f"brute force on {rays.kind} rays of view {view.name}"
-                with self.progress.step("judge", self.guess.judge(), stage):
-                    seed = 3 * self.views.index(view) + number
-                    judge_rays(self.core, self.mesh, rays, self.plan, seed, self.token)
+                stage = f"brute force on {rays.name} of view {view.name}"
+                bounces = sum(1 for other in view.sets if other.kind == rays.kind)
+                with self.progress.step("judge", self.guess.judge() / bounces, stage):
+                    wanted = -(-self.plan.judged_rays // bounces)
+                    seed = 1000 * self.views.index(view) + number
+                    judge_rays(self.core, self.mesh, rays, wanted, self.plan, seed, self.token)
             if not self.result.reference:
                 self.result.reference = tree.row.name
         if tree.row.error:
@@ -261,16 +271,16 @@ class _Runner:
             if row.error:
                 continue
             with self._failing_alone([row]):
-                stage = f"checking {rays.kind} rays of view {view.name}: {_title(row)}"
-                with self._trace_step(view, stage):
+                stage = f"checking {rays.name} of view {view.name}: {title(row)}"
+                with self._trace_step(rays, stage):
                     hit = contender.trace(rays, False, self.token)
                 row.measurements.append(self._judged(view, rays, Answers.of(hit), row))
                 if isinstance(contender, OurTree):
-                    with self._trace_step(view, stage.replace("checking", "counting the work of")):
+                    with self._trace_step(rays, stage.replace("checking", "counting the work of")):
                         counted = contender.trace(rays, True, self.token)
-                    measurement = row.measurements[-1]
-                    measurement.node_visits = int(counted.node_visits.sum(dtype=np.uint64))
-                    measurement.triangle_tests = int(counted.triangle_tests.sum(dtype=np.uint64))
+                    for counter in COUNTERS:
+                        total = int(getattr(counted, counter).sum(dtype=np.uint64))
+                        setattr(row.measurements[-1], counter, total)
 
     def _judged(self, view: View, rays: RaySet, answers: Answers, row: Row) -> Measurement:
         if rays.reference is None:
@@ -279,6 +289,7 @@ class _Runner:
             view.name,
             rays.kind,
             len(rays),
+            rays.bounce,
             hits=int(answers.occluded.sum()),
             hits_sha256=answers.sha256(),
         )
@@ -306,13 +317,13 @@ class _Runner:
                 if row.error:
                     continue
                 stage = (
-                    f"timing view {view.name}, {repeat + 1} of {self.plan.repeats}: {_title(row)}"
+                    f"timing view {view.name}, {repeat + 1} of {self.plan.repeats}: {title(row)}"
                 )
                 with self._failing_alone([row]):
                     for rays in view.sets:
-                        with self._trace_step(view, stage):
+                        with self._trace_step(rays, stage):
                             hit = contender.trace(rays, False, self.token)
-                        _record_time(row, view, rays, hit)
+                        row.add_times(view.name, rays.kind, rays.bounce, hit)
                         self._stop_if_cancelled()
 
     def _render(self, view: View, trees: Sequence[OurTree]) -> None:
@@ -320,9 +331,9 @@ class _Runner:
             row = tree.row
             if row.error:
                 continue
-            stage = f"picture of view {view.name}: {_title(row)}"
+            stage = f"picture of view {view.name}: {title(row)}"
             with self._failing_alone([row]):
-                with self.progress.step("render", self.guess.render(view), stage):
+                with self.progress.step("render", self.guess.view(view)["render"], stage):
                     picture = tree.render(self.scene, view, self.token)
                 self._keep_picture(view, row, picture)
 
@@ -340,8 +351,10 @@ class _Runner:
                 view.width,
                 view.height,
                 self.plan.samples,
-                int(picture.rays),
+                {kind: int(count) for kind, count in picture.rays.items()},
                 float(picture.seconds),
+                float(picture.trace_seconds),
+                hashlib.sha256(np.ascontiguousarray(picture.pixels).data).hexdigest(),
                 largest_difference=float(difference.max()),
                 differing_pixels=int(difference.any(axis=2).sum()),
             )
@@ -363,12 +376,12 @@ class _Runner:
             raise self.core.Cancelled("cancelled")
 
     @contextmanager
-    def _trace_step(self, view: View, stage: str) -> Iterator[None]:
-        with self.progress.step("trace", self.guess.trace(view), stage):
+    def _trace_step(self, rays: RaySet, stage: str) -> Iterator[None]:
+        with self.progress.step("trace", self.guess.trace(len(rays)), stage):
             yield
 
 
-def _subject(scene: Scene, views: Sequence[View]) -> Subject:
+def _subject(scene: Scene, made: Any, views: Sequence[View]) -> Subject:
     return Subject(
         scene.name,
         scene.source,
@@ -380,16 +393,5 @@ def _subject(scene: Scene, views: Sequence[View]) -> Subject:
         len(scene.lights),
         [view.name for view in views],
         scene.digest(),
+        [name for name, used in made.features.items() if used],
     )
-
-
-def _record_time(row: Row, view: View, rays: RaySet, hit: Any) -> None:
-    for measurement in row.measurements:
-        if measurement.view == view.name and measurement.kind == rays.kind:
-            measurement.key_seconds.append(hit.key_seconds)
-            measurement.sort_seconds.append(hit.sort_seconds)
-            measurement.traverse_seconds.append(hit.traverse_seconds)
-
-
-def _title(row: Row) -> str:
-    return f"{row.label} {row.branching}-wide" if row.branching else row.label

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from .plan import Plan
-from .results import KINDS, Result, Row, Spread, ratio
+from .results import COUNTERS, KINDS, Result, Row, Spread, ratio
 
 MISSING = "-"  # in a cell without a value
 
@@ -28,8 +28,9 @@ def columns(rows: Sequence[Row]) -> list[Column]:
         Column("builder", "", lambda row: row.label, left=True),
         Column("branching", "factor", lambda row: str(row.branching or MISSING)),
     ]
-    if any(row.reorder for row in rows):
-        chosen.append(Column("rays", "reordered", lambda row: "yes" if row.reorder else "no"))
+    reordered = any(row.reorder != "off" for row in rows)
+    if reordered:
+        chosen.append(Column("rays", "reordered", lambda row: row.reorder, left=True))
     if len({row.device for row in rows}) > 1:
         chosen.append(Column("device", "", lambda row: row.device, left=True))
     for title, unit, name in (
@@ -45,7 +46,9 @@ def columns(rows: Sequence[Row]) -> list[Column]:
         Column("BVH cost", "", lambda row: f"{row.tree.cost:.1f}" if row.tree else MISSING),
     ]
     chosen += [Column(kind, "MRays/s", _speed(kind)) for kind in KINDS]
-    for counter, unit in (("node_visits", "visits"), ("triangle_tests", "tests")):
+    if reordered:
+        chosen += [Column(kind, "% sorting", _sorting(kind)) for kind in KINDS[1:]]
+    for counter, unit in zip(COUNTERS, ("visits", "boxes", "triangles"), strict=True):
         chosen += [Column(kind, unit, _per_ray(counter, kind)) for kind in KINDS]
     return [
         *chosen,
@@ -66,8 +69,17 @@ def _build(row: Row) -> str:
 
 def _speed(kind: str) -> Callable[[Row], str]:
     def cell(row: Row) -> str:
-        repeats = min((len(m.seconds) for m in row.of_kind(kind)), default=0)
+        timed = [m for measured in row.of_kind(kind).values() for m in measured]
+        repeats = min((len(m.seconds) for m in timed), default=0)
         return _with_spread(row.speed(kind), 2, repeats)
+
+    return cell
+
+
+def _sorting(kind: str) -> Callable[[Row], str]:
+    def cell(row: Row) -> str:
+        share = row.sorting_share(kind) if row.reorder != "off" else None
+        return _optional(share and 100.0 * share, ".0f")
 
     return cell
 
@@ -128,9 +140,9 @@ def _blocks(widths: Sequence[int], width: int | None) -> list[list[int]]:
 
 
 def title(row: Row) -> str:
-    """A row in words, e.g. "SBVH 8-wide, reordered"."""
+    """A row in words, e.g. "SBVH 8-wide" or "SBVH 8-wide, rays sorted (aila)"."""
     name = f"{row.label} {row.branching}-wide" if row.branching else row.label
-    return f"{name}, reordered" if row.reorder else name
+    return name if row.reorder == "off" else f"{name}, rays sorted ({row.reorder})"
 
 
 def fastest(result: Result) -> list[str]:
@@ -161,26 +173,49 @@ def method(plan: Plan) -> list[str]:
     """What was measured and how, a sentence each."""
     judged = f"{plan.judged_rays} rays of each view and kind"
     builds = f"median of {plan.build_repeats} builds" if plan.build_repeats > 1 else "one build"
+    lines = [
+        f"Speed: MRays/s from the median of {plan.repeats} timed runs after a warm-up, all "
+        "variants interleaved; the arithmetic mean over the views, as in the paper. ± is half the "
+        "distance between the quartiles. Sort keys, sorting and traversal are included, generating "
+        "the rays is not.",
+        "Rays: those that the path tracer traces for one path of each pixel, generated once and "
+        "traced by every variant, bounce by bounce; paths that have ended have none. Primary: "
+        "closest hit, from the camera. Secondary: closest hit, from a hit on, in directions that "
+        f"the material scatters to, for {plan.depth} bounces. Shadow: any hit, {plan.shadow_rays} "
+        "towards sampled lights from each hit where light can be found so.",
+        "Visits, boxes, triangles: interior nodes visited, their children's boxes tested and "
+        "triangles tested, per ray, counted in a run of their own.",
+    ]
+    if set(plan.reorders) != {"off"}:
+        lines.append(
+            "Rays reordered: secondary and shadow rays of a bounce are sorted by a key of 32 bits "
+            "(Meister et al. 2020; aila is the paper's) and traced in that order; primary rays are "
+            "not. % sorting: what keys and sorting take of the time."
+        )
     return [
-        f"Speed: median of {plan.repeats} timed runs after a warm-up, all variants interleaved; "
-        "rays of all views over the sum of the views' median seconds. ± is half the distance "
-        "between the quartiles. Sort keys, sorting and traversal are included, generating the rays "
-        "is not.",
-        "Primary rays: closest hit, one through the centre of each pixel. Shadow rays: any hit, "
-        "one from each primary hit to a sampled light, or to the sky where there is no light. "
-        "Diffuse rays: closest hit, one in a random cosine-weighted direction from each primary "
-        "hit.",
-        "Visits and tests: interior nodes visited and triangles tested, per ray, counted in a run "
-        "of their own.",
+        *lines,
         f"Build: {builds}, binary tree and collapse together.",
         "BVH cost: Eq. 2 (binary) and 3 (wide) of Meister & Bittner 2022 with c_T = "
         f"{plan.traversal:g}, c_I = {plan.intersection:g}.",
         f"Wrong hits: against brute force in double precision on {judged}; equal distances (within "
         "4 float32 ulp) are no error. Differing rays: against the first variant, bit for bit, over "
         "all rays; for Embree by the rule for wrong hits.",
-        f"Picture: primary rays with direct light and shadow rays, {plan.samples} samples per "
-        "pixel; the difference is the largest of any channel (linear) to the first variant's.",
+        f"Picture: path traced, {plan.samples} samples per pixel, depth {plan.depth}, "
+        f"{plan.shadow_rays} shadow rays a hit; the difference is the largest of any channel "
+        "(linear) to the first variant's.",
     ]
+
+
+def ray_counts(result: Result) -> list[str]:
+    """How many rays of each kind were traced, a sentence; none before any was."""
+    said = []
+    for kind in KINDS:
+        bounces = [count for (of, _), count in result.rays().items() if of == kind]
+        text = f"{sum(bounces):,d} {kind}"
+        if len(bounces) > 1:
+            text += f" ({' + '.join(f'{count:,d}' for count in bounces)} by bounce)"
+        said.append(text)
+    return [f"Rays of all views: {', '.join(said)}."] if result.rays() else []
 
 
 def failures(result: Result) -> list[str]:
@@ -196,12 +231,14 @@ def failures(result: Result) -> list[str]:
 
 
 def header(result: Result) -> list[str]:
-    """Scene and machine, a line each."""
+    """Scene, rays and machine, a line each."""
     scene, machine = result.subject, result.machine
     threads = max((row.threads for row in result.rows), default=0)
     return [
         f"Scene {scene.name}: {scene.triangles:,d} triangles ({scene.geometry} geometry), "
         f"{len(scene.views)} views ({', '.join(scene.views)}).",
+        f"The picture needs: {', '.join(scene.features) or 'nothing but diffuse surfaces'}.",
+        *ray_counts(result),
         f"{machine.host} with BVH Lab {machine.version}; {machine.cpu}, {threads} threads.",
     ]
 

@@ -41,7 +41,7 @@ class Compare(EmptySceneTest):
         add_light("POINT").location = (3, 3, 6)
         settings = bpy.context.scene.bvh_lab
         settings.resolution, settings.samples, settings.views = 48, 1, 1
-        settings.repeats, settings.judged_rays = 3, 64
+        settings.repeats, settings.judged_rays, settings.ray_resolution = 3, 64, 48
 
     def study(self):
         from bvh_lab.blender import store
@@ -80,11 +80,12 @@ class Compare(EmptySceneTest):
         for builder in SWITCHED_ON[1:]:
             setattr(settings, f"use_{builder}", False)
         settings.use_2 = settings.use_4 = False
-        settings.order, settings.geometry, settings.embree = "both", "render", False
+        settings.use_reordering, settings.reorder_key = True, "octahedron"
+        settings.geometry, settings.embree = "render", False
         settings.pictures = False
         bpy.ops.bvhlab.compare()
         result = self.study().result
-        self.assertEqual([row.name for row in result.rows], ["lbvh_8", "lbvh_8_reordered"])
+        self.assertEqual([row.name for row in result.rows], ["lbvh_8", "lbvh_8_octahedron"])
         self.assertEqual(result.subject.geometry, "render")
         self.assertEqual(self.study().pictures, {})
 

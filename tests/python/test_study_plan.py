@@ -9,7 +9,14 @@ from typing import Any
 import pytest
 from bvh_lab.native import core
 from bvh_lab.study.arguments import add_plan_arguments, plan_from_arguments
-from bvh_lab.study.plan import BUILDERS, UNLIMITED_REFERENCES, Plan, Variant
+from bvh_lab.study.plan import (
+    BUILDERS,
+    PRESETS,
+    REORDERS,
+    UNLIMITED_REFERENCES,
+    Plan,
+    Variant,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -21,14 +28,14 @@ def plan_of(*words: str) -> Plan:
 
 
 def test_variants_are_all_combinations_with_builders_slowest() -> None:
-    plan = Plan(builders=["lbvh", "sah"], branchings=[2, 8], reorders=[False, True])
+    plan = Plan(builders=["lbvh", "sah"], branchings=[2, 8], reorders=["off", "aila"])
     names = [variant.name for variant in plan.variants()]
-    assert names[:4] == ["lbvh_2", "lbvh_2_reordered", "lbvh_8", "lbvh_8_reordered"]
+    assert names[:4] == ["lbvh_2", "lbvh_2_aila", "lbvh_8", "lbvh_8_aila"]
     assert len(set(names)) == len(names) == 8
 
 
 def test_variant_name_holds_its_device() -> None:
-    assert Variant("sah", 4, False, "opencl:a/b c").name == "sah_4_opencl-a-b-c"
+    assert Variant("sah", 4, "off", "opencl:a/b c").name == "sah_4_opencl-a-b-c"
 
 
 @pytest.mark.parametrize("preset", ["quick", "paper"])
@@ -54,9 +61,27 @@ def test_presets_do_not_share_their_settings() -> None:
     assert Plan().params["prbvh_a"]["iterations"] > 1.0
 
 
-def test_paper_preset_has_the_papers_resolution() -> None:
+def test_paper_preset_is_the_papers() -> None:
     plan = Plan.from_preset("paper")
     assert (plan.width, plan.height, plan.traversal, plan.intersection) == (1024, 768, 3.0, 2.0)
+    assert (plan.samples, plan.depth, plan.shadow_rays, plan.views) == (32, 8, 2, 3)
+    assert plan.reorders == ["off", "aila"] and plan.ray_long_side == 0
+    assert all(Plan.from_preset(preset).repeats >= 5 for preset in PRESETS)
+
+
+def test_orders_of_rays_are_those_of_the_core() -> None:
+    mesh = core.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    bvh = core.build(mesh, "lbvh")
+    for reorder in REORDERS:
+        core.trace(bvh, [[0, 0, 1]], [[0, 0, -1]], reorder=reorder)
+    with pytest.raises(ValueError, match=f"unknown ray order .*: {', '.join(REORDERS)}$"):
+        core.trace(bvh, [[0, 0, 1]], [[0, 0, -1]], reorder="morton")
+    with pytest.raises(ValueError, match="reorder must be True, False or a name, not 1"):
+        core.trace(bvh, [[0, 0, 1]], [[0, 0, -1]], reorder=1)
+
+
+def test_orders_of_older_plans_are_read() -> None:
+    assert Plan.from_json('{"reorders": [false, true]}').reorders == ["off", "aila"]
 
 
 @pytest.mark.parametrize(
@@ -70,6 +95,10 @@ def test_paper_preset_has_the_papers_resolution() -> None:
         ({"devices": ["opencl"]}, "device 'opencl' cannot be used: "),
         ({"repeats": 2}, "repeats is 2; it must be from 3"),
         ({"samples": 0}, "samples is 0"),
+        ({"depth": -1}, "depth is -1; it must be from 0"),
+        ({"shadow_rays": -1}, "shadow_rays is -1"),
+        ({"ray_long_side": 1}, "ray_long_side is 1; it must be from 8"),
+        ({"reorders": ["off", "on"]}, "unknown reorder 'on'; there are: off, aila, "),
         ({"views": 0}, "views is 0"),
         ({"views": []}, "views is empty"),
         ({"width": 64}, "64x0 needs both"),
@@ -96,7 +125,7 @@ plans = st.builds(
     Plan,
     builders=st.lists(st.text()),
     branchings=st.lists(st.integers()),
-    reorders=st.lists(st.booleans()),
+    reorders=st.lists(st.text()),
     params=st.dictionaries(
         st.text(), st.dictionaries(st.text(), st.floats(allow_nan=False, allow_infinity=False))
     ),
@@ -141,10 +170,23 @@ def test_arguments_change_the_preset() -> None:
             "--samples",
             "7",
         ],
-        *["--reorder", "both", "--no-embree", "--param", "sbvh.alpha=1e-4", "--threads", "1"],
+        *[
+            "--reorder",
+            "off,origin",
+            "--no-embree",
+            "--depth",
+            "3",
+            "--shadow-rays",
+            "1",
+            "--param",
+            "sbvh.alpha=1e-4",
+            "--threads",
+            "1",
+        ],
     )
     assert (plan.width, plan.builders, plan.branchings) == (1024, ["sah"], [8, 2])
-    assert (plan.views, plan.samples, plan.reorders) == (2, 7, [False, True])
+    assert (plan.views, plan.samples, plan.reorders) == (2, 7, ["off", "origin"])
+    assert (plan.depth, plan.shadow_rays) == (3, 1)
     assert (plan.embree, plan.pictures, plan.threads) == (False, True, 1)
     assert plan.params["sbvh"] == {"max_references": UNLIMITED_REFERENCES, "alpha": 1e-4}
 

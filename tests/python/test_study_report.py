@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from bvh_lab.study.output import file_stems, staged_folder, write_text_aside
 from bvh_lab.study.report import write_report
-from bvh_lab.study.results import Result
+from bvh_lab.study.results import Measurement, Result, Row
 from bvh_lab.study.run import Study, compare
-from bvh_lab.study.table import fastest, text_report, text_table
+from bvh_lab.study.table import fastest, ray_counts, text_report, text_table, title
 from PIL import Image
 from study_samples import sample_scene, small_plan
 
@@ -37,7 +37,8 @@ def test_table_is_aligned_with_a_row_per_variant(study: Study) -> None:
         "references",
         "depth",
     ]
-    assert lines[1].split()[-9:-3] == ["visits"] * 3 + ["tests"] * 3
+    units = ["visits"] * 3 + ["boxes"] * 3 + ["triangles"] * 3
+    assert lines[1].split()[-12:-3] == units
     assert len({line.rstrip()[-1] for line in lines}) > 1
     assert {len(line) for line in lines[2:]} == {len(lines[2])}
     assert lines[3].startswith("LBVH ") and "±" in lines[3]
@@ -63,6 +64,31 @@ def test_text_names_the_fastest_with_its_error(study: Study) -> None:
     report = text_report(study.result)
     assert lines[0] in report and "A note of the extraction." in report
     assert "FAILED" not in report
+
+
+def test_text_tells_the_rays_by_kind_and_bounce(study: Study) -> None:
+    rays = study.result.rays()
+    (line,) = ray_counts(study.result)
+    assert f"{rays['primary', 0]:,d} primary, " in line
+    first, second = rays["secondary", 1], rays["secondary", 2]
+    assert f" {first + second:,d} secondary ({first:,d} + {second:,d} by bounce), " in line
+    assert line in text_report(study.result)
+
+
+def test_sorted_rays_show_what_sorting_takes() -> None:
+    times = {"key_seconds": [1e-3], "sort_seconds": [1e-3], "traverse_seconds": [6e-3]}
+    rows = [
+        Row("sah_2", "SAH", "bvh_lab", "sah", 2, reorder, "cpu", measurements=[measured])
+        for reorder, measured in (
+            ("off", Measurement("a", "shadow", 10, traverse_seconds=[6e-3])),
+            ("origin", Measurement("a", "shadow", 10, **times)),
+        )
+    ]
+    rows[0].measurements[0].key_seconds = rows[0].measurements[0].sort_seconds = [0.0]
+    table = text_table(rows).splitlines()
+    assert "% sorting" in table[1] and " 25 " in table[4] and " 25 " not in table[3]
+    assert title(rows[0]) == "SAH 2-wide"
+    assert title(rows[1]) == "SAH 2-wide, rays sorted (origin)"
 
 
 def test_text_shows_failures(study: Study) -> None:
@@ -105,7 +131,14 @@ def folder(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_folder_is_whole_and_alone(study: Study, folder: Path) -> None:
     assert [path.name for path in folder.parent.iterdir()] == ["boxes"]
     names = {path.name for path in folder.iterdir()}
-    assert names == {"table.txt", "results.csv", "results.json", "index.html", "pictures"}
+    assert names == {
+        "table.txt",
+        "results.csv",
+        "rays.csv",
+        "results.json",
+        "index.html",
+        "pictures",
+    }
     assert (folder / "table.txt").read_text() == text_report(study.result)
     assert Result.from_json((folder / "results.json").read_text()) == study.result
     with (folder / "results.csv").open(newline="") as file:

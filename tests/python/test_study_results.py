@@ -10,6 +10,7 @@ import json
 import pytest
 from bvh_lab.study.plan import Plan
 from bvh_lab.study.results import (
+    FORMAT,
     Errors,
     Machine,
     Measurement,
@@ -18,23 +19,25 @@ from bvh_lab.study.results import (
     Row,
     Subject,
     Tree,
-    csv_record,
     ratio,
     spread,
 )
+from bvh_lab.study.spreadsheet import csv_record, rays_csv, rows_csv
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 
-def timed(view: str, rays: int, seconds: list[float], **more: int) -> Measurement:
-    """Primary rays whose repeats took ``seconds``, all of it traversal."""
+def timed(
+    view: str, rays: int, seconds: list[float], kind: str = "primary", **more: int
+) -> Measurement:
+    """Rays whose repeats took ``seconds``, all of it traversal."""
     zeros = [0.0] * len(seconds)
     times = {"key_seconds": zeros, "sort_seconds": zeros, "traverse_seconds": seconds}
-    return Measurement(view, "primary", rays, **more, **times)
+    return Measurement(view, kind, rays, **more, **times)
 
 
 def row_of(*measurements: Measurement, name: str = "sah_2") -> Row:
-    return Row(name, "SAH", "bvh_lab", "sah", 2, False, "cpu", measurements=[*measurements])
+    return Row(name, "SAH", "bvh_lab", "sah", 2, "off", "cpu", measurements=[*measurements])
 
 
 def test_spread_is_median_and_quartiles() -> None:
@@ -43,16 +46,45 @@ def test_spread_is_median_and_quartiles() -> None:
     assert spread([5.0, 1.0, 3.0, 2.0, 4.0]).half_percent == pytest.approx(100.0 / 3.0)
 
 
-def test_speed_is_all_rays_over_the_sum_of_the_views_medians() -> None:
+def test_speed_is_the_mean_of_the_views_speeds() -> None:
     row = row_of(
         timed("a", 1_000_000, [0.1, 0.3, 0.2]),  # quartiles 0.15, 0.2, 0.25
         timed("b", 3_000_000, [0.6, 0.6, 0.6]),
     )
     speed = row.speed("primary")
     assert speed is not None
-    assert speed.median == pytest.approx(4.0 / 0.8)
-    assert (speed.low, speed.high) == (pytest.approx(4.0 / 0.85), pytest.approx(4.0 / 0.75))
+    assert speed.median == pytest.approx((5.0 + 5.0) / 2.0)
+    assert speed.low == pytest.approx((4.0 + 5.0) / 2.0)
+    assert speed.high == pytest.approx((1.0 / 0.15 + 5.0) / 2.0)
     assert row.speed("shadow") is None
+
+
+def test_speed_of_a_view_is_all_its_rays_over_their_seconds() -> None:
+    bounces = [
+        timed("a", 1_000_000, [0.1, 0.2, 0.3], kind="secondary", bounce=1),
+        timed("a", 200_000, [0.3, 0.1, 0.1], kind="secondary", bounce=2),
+    ]  # together 0.4, 0.3, 0.4 s
+    speeds = row_of(*bounces, timed("b", 9, [1.0], kind="secondary")).view_speeds("secondary")
+    assert speeds["a"].median == pytest.approx(1.2 / 0.4)
+    assert speeds["a"].high == pytest.approx(1.2 / 0.35)
+    assert list(speeds) == ["a", "b"]
+
+
+def test_a_view_is_left_out_until_all_its_bounces_are_timed() -> None:
+    row = row_of(
+        timed("a", 10, [0.1], kind="shadow"),
+        timed("a", 10, [], kind="shadow", bounce=1),
+        timed("b", 1_000_000, [0.5, 0.9], kind="shadow"),
+        timed("b", 1_000_000, [0.5], kind="shadow", bounce=1),  # stopped before its second repeat
+    )
+    assert {view: s.median for view, s in row.view_speeds("shadow").items()} == {"b": 2.0}
+
+
+def test_sorting_share_is_that_of_the_medians() -> None:
+    parts = {"key_seconds": [1.0] * 3, "sort_seconds": [2.0] * 3}
+    measured = Measurement("a", "shadow", 10, **parts, traverse_seconds=[5.0, 4.0, 9.0])
+    assert row_of(measured).sorting_share("shadow") == pytest.approx(3.0 / 8.0)
+    assert row_of(measured).sorting_share("primary") is None
 
 
 def test_seconds_hold_keys_sort_and_traversal() -> None:
@@ -67,7 +99,7 @@ def test_counters_are_per_ray_over_all_views() -> None:
     )
     assert row.per_ray("node_visits", "primary") == 3.0
     assert row.per_ray("triangle_tests", "primary") == 1.0
-    assert row.per_ray("node_visits", "diffuse") is None
+    assert row.per_ray("node_visits", "secondary") is None
     assert row_of(Measurement("a", "primary", 10)).per_ray("node_visits", "primary") is None
 
 
@@ -96,7 +128,7 @@ def test_only_our_own_rows_can_disagree() -> None:
 
 def test_a_picture_difference_is_a_disagreement() -> None:
     row = row_of()
-    row.pictures = [Picture("a", 2, 2, 1, 8, 0.1, largest_difference=0.5, differing_pixels=1)]
+    row.pictures = [Picture("a", 2, 2, 1, {"primary": 4}, 0.1, 0.1, "", 0.5, differing_pixels=1)]
     assert row.disagrees()
 
 
@@ -120,7 +152,10 @@ rows = st.builds(
         ),
         max_size=3,
     ),
-    pictures=st.lists(st.builds(Picture, largest_difference=finite, seconds=finite), max_size=3),
+    pictures=st.lists(
+        st.builds(Picture, largest_difference=finite, seconds=finite, trace_seconds=finite),
+        max_size=3,
+    ),
 )
 machines = st.builds(
     Machine,
@@ -140,7 +175,7 @@ machines = st.builds(
         seconds=finite,
         rows=st.lists(rows, max_size=3),
         notes=st.lists(st.text()),
-        format=st.just(1),
+        format=st.just(FORMAT),
     )
 )
 def test_json_gives_the_same_rows(result: Result) -> None:
@@ -154,8 +189,8 @@ def empty_result() -> Result:
 
 
 def test_results_of_another_format_are_refused() -> None:
-    text = empty_result().to_json().replace('"format": 1', '"format": 99')
-    with pytest.raises(ValueError, match="results of format 99; this reads 1"):
+    text = empty_result().to_json().replace(f'"format": {FORMAT}', '"format": 99')
+    with pytest.raises(ValueError, match=f"results of format 99; this reads {FORMAT}"):
         Result.from_json(text)
 
 
@@ -171,12 +206,30 @@ def test_a_row_with_a_bad_field_is_named() -> None:
 def test_csv_has_a_line_per_row_with_full_precision() -> None:
     result = empty_result()
     result.rows = [row_of(timed("a", 10, [0.1, 0.3, 0.2])), row_of(name='with "quotes", commas')]
-    lines = list(csv.DictReader(io.StringIO(result.to_csv())))
+    lines = list(csv.DictReader(io.StringIO(rows_csv(result))))
     assert [line["name"] for line in lines] == ["sah_2", 'with "quotes", commas']
     speed = result.rows[0].speed("primary")
     assert speed is not None and float(lines[0]["primary_mrays_per_second"]) == speed.median
     assert lines[0]["nodes"] == lines[1]["primary_mrays_per_second"] == ""
     assert list(lines[0]) == list(csv_record(result.rows[0]))
+
+
+def test_csv_of_rays_has_a_line_per_bounce() -> None:
+    result = empty_result()
+    result.rows = [
+        row_of(
+            timed("a", 3_000_000, [0.5, 1.5, 1.0], kind="shadow", bounce=1, box_tests=6, hits=2),
+            timed("b", 10, []),
+        )
+    ]
+    first, second = csv.DictReader(io.StringIO(rays_csv(result)))
+    assert (first["name"], first["kind"], first["bounce"], first["rays"]) == (
+        *("sah_2", "shadow"),
+        *("1", "3000000"),
+    )
+    assert (first["box_tests"], first["hits"], first["node_visits"]) == ("6", "2", "")
+    assert float(first["mrays_per_second"]) == 3.0 and float(first["traverse_seconds"]) == 1.0
+    assert second["mrays_per_second"] == second["traverse_seconds"] == ""
 
 
 def test_an_unknown_row_is_named() -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from types import SimpleNamespace
@@ -14,11 +15,13 @@ from bvh_lab.native import core
 from bvh_lab.study import run
 from bvh_lab.study.job import Job
 from bvh_lab.study.progress import Event, RowChanged, Step
-from bvh_lab.study.results import KINDS, Result
+from bvh_lab.study.results import COUNTERS, KINDS, Result
 from bvh_lab.study.run import Study, compare
 from bvh_lab.study.scene import Material
 from study_samples import sample_scene, small_plan
 
+# Kinds and bounces of the rays of small_plan().
+PLACES = [("primary", 0), *(("secondary", i) for i in (1, 2)), *(("shadow", i) for i in (0, 1, 2))]
 EMBREE = core.embree()["available"]
 
 
@@ -34,7 +37,7 @@ class Double:
 
 @pytest.fixture(scope="module")
 def study() -> Study:
-    return compare(sample_scene(), small_plan(reorders=[False, True]), host="pytest")
+    return compare(sample_scene(), small_plan(reorders=["off", "aila"]), host="pytest")
 
 
 def test_every_variant_has_its_row(study: Study) -> None:
@@ -64,33 +67,64 @@ def test_every_row_is_measured_and_judged(study: Study) -> None:
     plan, views = study.result.plan, study.result.subject.views
     assert len(views) == plan.views == 2
     for row in study.result.rows:
-        assert [(m.view, m.kind) for m in row.measurements] == [
-            (v, k) for v in views for k in KINDS
+        assert [(m.view, m.kind, m.bounce) for m in row.measurements] == [
+            (view, *place) for view in views for place in PLACES
         ]
         for measurement in row.measurements:
             assert len(measurement.seconds) == plan.repeats and min(measurement.seconds) > 0.0
-            assert measurement.errors.judged == min(plan.judged_rays, measurement.rays)
+            bounces = sum(1 for kind, _ in PLACES if kind == measurement.kind)
+            wanted = math.ceil(plan.judged_rays / bounces)
+            assert measurement.errors.judged == min(wanted, measurement.rays)
             assert 0 < measurement.hits <= measurement.rays
-            assert (measurement.node_visits is None) == (row.system == "embree")
+            if row.system == "embree":
+                assert measurement.node_visits is None
+                continue
+            visits, boxes = measurement.node_visits, measurement.box_tests
+            assert visits is not None and boxes is not None
+            # The root alone may have fewer children than two.
+            assert 2 * visits - measurement.rays <= boxes <= row.branching * visits
+            assert measurement.triangle_tests is not None
+            assert measurement.triangle_tests >= measurement.hits
         assert row.errors().wrong == 0
         assert all(row.speed(kind) for kind in KINDS)
 
 
-def test_secondary_rays_start_at_hits_only(study: Study) -> None:
-    first, shadow, diffuse = study.result.rows[0].measurements[:3]
-    assert first.rays == 48 * 36
-    assert shadow.rays == diffuse.rays == first.hits < first.rays
+def test_rays_are_those_of_the_path_tracer(study: Study) -> None:
+    """One path a pixel: no more and no fewer rays than one sample of the picture traces."""
+    row = study.result.rows[0]
+    for picture in row.pictures:
+        assert picture.samples == 1 and (picture.width, picture.height) == (48, 36)
+        of_view = [m for m in row.measurements if m.view == picture.view]
+        for kind in KINDS:
+            assert sum(m.rays for m in of_view if m.kind == kind) == picture.rays[kind] > 0
+        primary, first = of_view[0], of_view[1]
+        assert primary.rays == 48 * 36 and first.rays == primary.hits < primary.rays
+    assert sum(study.result.rays().values()) == sum(m.rays for m in row.measurements)
+
+
+def test_fewer_rays_may_be_measured_than_the_picture_has() -> None:
+    plan = small_plan(builders=["sah"], branchings=[4], ray_long_side=16, depth=0, shadow_rays=1)
+    result = compare(sample_scene(), plan).result
+    assert list(result.rays()) == [("primary", 0), ("shadow", 0)]
+    row = result.rows[0]
+    assert {m.rays for m in row.of_kind("primary")[row.pictures[0].view]} == {16 * 12}
+    assert (row.pictures[0].width, row.speed("secondary")) == (48, None)
+    assert not any("has no" in note for note in result.notes)
 
 
 def test_reordering_costs_keys_and_sorting(study: Study) -> None:
-    for name, reordered in (("sah_2", False), ("sah_2_reordered", True)):
+    for name, reorder in (("sah_2", "off"), ("sah_2_aila", "aila")):
         row = study.result.row(name)
-        assert row.reorder == reordered
-        assert all((sum(m.sort_seconds) > 0.0) == reordered for m in row.measurements)
+        assert row.reorder == reorder
+        for m in row.measurements:
+            sorts = reorder == "aila" and m.kind != "primary"
+            assert (sum(m.key_seconds) > 0.0) == (sum(m.sort_seconds) > 0.0) == sorts
+        share = row.sorting_share("shadow")
+        assert share is not None and (0.0 < share < 1.0) == (reorder == "aila")
 
 
 def test_both_orders_share_one_build(study: Study) -> None:
-    plain, reordered = study.result.row("sah_2"), study.result.row("sah_2_reordered")
+    plain, reordered = study.result.row("sah_2"), study.result.row("sah_2_aila")
     assert plain.build_seconds == reordered.build_seconds
 
 
@@ -109,6 +143,13 @@ def test_pictures_of_equal_variants_share_memory(study: Study) -> None:
     assert picture.shape == (36, 48, 3) and picture.dtype == np.float32 and picture.max() > 0.0
     assert study.pictures["sah_8", first] is picture
     assert study.pictures["sah_8", rest[0]] is not picture
+    for number in range(2):
+        rows = [row for row in study.result.rows if row.pictures]
+        assert len({row.pictures[number].sha256 for row in rows}) == 1
+
+
+def test_result_lists_what_the_picture_needs(study: Study) -> None:
+    assert study.result.subject.features == ["lamps", "world"]
 
 
 def test_result_goes_to_json_and_back(study: Study) -> None:
@@ -131,7 +172,7 @@ def test_same_seed_same_answers(study: Study) -> None:
     ]
     other = compare(sample_scene(), small_plan(builders=["sah"], branchings=[4], seed=1))
     hashes = [m.hits_sha256 for m in other.result.rows[0].measurements]
-    assert hashes[2] != ours.measurements[2].hits_sha256  # the diffuse rays are random
+    assert hashes[1] != ours.measurements[1].hits_sha256  # the secondary rays are random
 
 
 def test_events_tell_progress_and_rows() -> None:
@@ -153,7 +194,7 @@ def test_no_more_than_asked_for() -> None:
     study = compare(sample_scene(), plan)
     (row,) = study.result.rows
     assert not study.pictures and not row.pictures and row.picture_difference() is None
-    assert row.errors().judged == 0 and row.speed("diffuse")
+    assert row.errors().judged == 0 and row.speed("secondary")
 
 
 def test_a_view_of_nothing_has_primary_rays_only() -> None:
@@ -164,7 +205,8 @@ def test_a_view_of_nothing_has_primary_rays_only() -> None:
     assert not result.failed()
     assert [m.kind for m in result.rows[0].measurements] == ["primary"]
     assert (
-        "View auto_1 has no diffuse and shadow rays: no primary ray hit anything." in result.notes
+        "View auto_1 has no secondary and shadow rays: nothing was hit that sends any there."
+        in result.notes
     )
     assert Result.from_json(result.to_json()) == result
 
@@ -173,7 +215,7 @@ def test_trees_that_do_not_fit_are_measured_in_groups() -> None:
     plan = small_plan(memory_gib=1e-9, embree=False)
     result = compare(sample_scene(), plan).result
     assert [row.group for row in result.rows] == [1, 1, 2, 2]
-    assert not result.failed() and all(row.speed("diffuse") for row in result.rows)
+    assert not result.failed() and all(row.speed("secondary") for row in result.rows)
     assert any("measured in 2 groups" in note for note in result.notes)
 
 
@@ -206,7 +248,7 @@ def test_a_variant_that_answers_otherwise_fails(monkeypatch: pytest.MonkeyPatch)
         hit = core.trace(bvh, *arguments, **more)
         if bvh.builder != "sah" or hit.t is None:
             return hit
-        names = ("occluded", "t", "u", "v", "triangle", "node_visits", "triangle_tests")
+        names = ("occluded", "t", "u", "v", "triangle", *COUNTERS)
         names += ("key_seconds", "sort_seconds", "traverse_seconds")
         lie = SimpleNamespace(**{name: getattr(hit, name) for name in names})
         lie.t = np.where(hit.occluded, np.nextafter(hit.t, np.float32(0)), hit.t)
@@ -242,6 +284,12 @@ def test_bad_scenes_are_refused(changes: dict[str, Any], said: str) -> None:
         compare(sample_scene(**changes), small_plan())
 
 
+def test_rays_that_do_not_fit_are_refused() -> None:
+    plan = small_plan(ray_long_side=16384, depth=1024)
+    with pytest.raises(ValueError, match=r"may take [\d.]+ GiB and [\d.]+ GiB are free; choose a"):
+        compare(sample_scene(), plan)
+
+
 def test_unknown_views_are_named() -> None:
     with pytest.raises(ValueError, match="unknown view 'Nave'; there are: auto_1, auto_2, auto_3"):
         compare(sample_scene(), small_plan(views=["Nave"]))
@@ -265,7 +313,7 @@ def test_a_job_hands_over_its_error() -> None:
 
 
 def test_cancel_keeps_the_rows_measured() -> None:
-    job = Job(sample_scene(), small_plan(repeats=1000, embree=False))
+    job = Job(sample_scene(), small_plan(repeats=300, ray_long_side=16, embree=False))
     while job.fraction < 0.05 or not job.stage.startswith("timing"):
         job.wait(0.005)
         job.poll()

@@ -24,7 +24,7 @@ import bvh_lab
 from bvh_lab.blender import store, summary
 
 TICK_SECONDS = 0.03
-PATIENCE_SECONDS = 60.0
+PATIENCE_SECONDS = 120.0
 seen: dict[str, object] = {}
 
 
@@ -117,7 +117,7 @@ def steps() -> Iterator[None]:
     yield from scroll_to_end(properties)
     yield from screenshot("1_before.png")
 
-    settings.resolution, settings.repeats = 1024, 100
+    settings.resolution, settings.ray_resolution, settings.repeats = 1024, 512, 100
     position = yield from find_button(properties, "bpy.ops.bvhlab.compare")
     click(*position)
     yield from wait_for("the comparison runs", lambda: store.running is not None)
@@ -137,7 +137,8 @@ def steps() -> Iterator[None]:
 
     yield from scroll_to_end(properties)
     settings.resolution, settings.repeats, settings.views = 128, 3, 2
-    settings.judged_rays, settings.samples = 64, 1
+    settings.judged_rays, settings.samples, settings.depth = 64, 1, 1
+    settings.ray_resolution = 64
     settings.geometry, scenes = "render", len(bpy.data.scenes)
     position = yield from find_button(properties, "bpy.ops.bvhlab.compare")
     click(*position)

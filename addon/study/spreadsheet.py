@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The results as CSV: units in the column names, full precision, empty where there is no value."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from .results import COUNTERS, KINDS, Measurement, Result, Row, mrays_per_second, spread
+
+
+def rows_csv(result: Result) -> str:
+    """One line per row."""
+    return _csv(csv_record(_nothing()), [csv_record(row) for row in result.rows])
+
+
+def rays_csv(result: Result) -> str:
+    """One line per row, view, kind of ray and bounce."""
+    heading = measurement_record(_nothing(), Measurement("", "", 0))
+    return _csv(heading, [measurement_record(r, m) for r in result.rows for m in r.measurements])
+
+
+def _nothing() -> Row:
+    return Row("", "", "", "", 0, "off", "")
+
+
+def _csv(heading: dict[str, Any], records: Sequence[dict[str, Any]]) -> str:
+    out = io.StringIO()
+    writer = csv.DictWriter(out, heading.keys(), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(records)
+    return out.getvalue()
+
+
+def csv_record(row: Row) -> dict[str, Any]:
+    """The row's line of the CSV file: column name to value, None where there is none."""
+    tree = asdict(row.tree) if row.tree else {}
+    errors = row.errors()
+    names = ("name", "label", "system", "builder", "branching", "reorder", "device", "threads")
+    record: dict[str, Any] = {name: getattr(row, name) for name in names}
+    for name in (
+        "nodes",
+        "leaves",
+        "references",
+        "max_depth",
+        "average_leaf_size",
+        "bytes",
+        "cost",
+    ):
+        record[name] = tree.get(name)
+    for name in ("build_seconds", "tree_seconds", "collapse_seconds"):
+        seconds = getattr(row, name)
+        record[name] = spread(seconds).median if seconds else None
+    for kind in KINDS:
+        speed = row.speed(kind)
+        for i, part in enumerate(("_low", "", "_high")):
+            record[f"{kind}_mrays_per_second{part}"] = speed[i] if speed else None
+        record[f"{kind}_sorting_share"] = row.sorting_share(kind)
+    for counter in COUNTERS:
+        for kind in KINDS:
+            record[f"{kind}_{counter}_per_ray"] = row.per_ray(counter, kind)
+    for name in ("judged", "wrong", "false_misses", "false_hits", "wrong_triangles"):
+        record[f"{name}_rays"] = getattr(errors, name)
+    record["largest_relative_t_error"] = errors.largest_t_error
+    record["differing_rays"] = row.differing_rays()
+    record["largest_picture_difference"] = row.picture_difference()
+    record["error"] = row.error
+    return record
+
+
+def measurement_record(row: Row, measurement: Measurement) -> dict[str, Any]:
+    """One measurement's line of the CSV file of rays."""
+    record: dict[str, Any] = {name: getattr(row, name) for name in ("name", "builder", "branching")}
+    record["reorder"] = row.reorder
+    for name in ("view", "kind", "bounce", "rays", "hits", *COUNTERS, "differing_rays"):
+        record[name] = getattr(measurement, name)
+    speed = mrays_per_second([measurement]) if measurement.seconds else None
+    for i, part in enumerate(("_low", "", "_high")):
+        record[f"mrays_per_second{part}"] = speed[i] if speed else None
+    for name in ("key_seconds", "sort_seconds", "traverse_seconds"):
+        seconds = getattr(measurement, name)
+        record[name] = spread(seconds).median if seconds else None
+    record["hits_sha256"] = measurement.hits_sha256
+    return record
