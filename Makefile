@@ -10,7 +10,7 @@ CPP_FILES = find native tests/native -name '*.h' -o -name '*.cpp'
 export SCENE
 .NOTPARALLEL:
 .PHONY: help setup build compare test lint test-native test-python test-bpy test-blender test-ui \
-	format test-scenes bench paper zip scenes clean check-scene
+	format test-scenes bench bench-cycles study paper zip scenes clean check-scene
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-13s %s\n", $$1, $$2}' Makefile
@@ -61,8 +61,15 @@ format: setup ## format all sources
 	@.venv/bin/ruff check --fix .
 	@.venv/bin/ruff format .
 
-bench: build ## time builders and tracing against Embree and mathutils.bvhtree into out/bench
+bench: build ## time builders and tracing against Embree and mathutils.bvhtree, and the path tracer against Cycles
 	@$(PYTHON) scripts/bench.py --out out/bench $(ARGS)
+	@$(PYTHON) scripts/bench_cycles.py --out out/bench
+
+bench-cycles: build ## the last part of bench alone, with ARGS="--resolution 320x240"
+	@$(PYTHON) scripts/bench_cycles.py --out out/bench $(ARGS)
+
+study: build ## the paper's tables and figures from blender_scenes/ into out/study, with ARGS="--builders lbvh,sah"
+	@$(PYTHON) scripts/study.py --out out/study $(ARGS)
 
 paper: check-scene build ## compare costs with the paper's on SCENE=file (.npz, .obj, .ply) into out/paper, with ARGS="--metrics"
 	@$(PYTHON) scripts/paper.py "$$SCENE" --out out/paper $(ARGS)

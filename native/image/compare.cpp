@@ -23,10 +23,14 @@ std::string size_text(const ImageView& image) {
 
 }  // namespace
 
-ImageDifference compare_images(const ImageView& a, const ImageView& b) {
+void check_same_size(const ImageView& a, const ImageView& b) {
     if (a.width != b.width || a.height != b.height || a.channels != b.channels)
         throw std::invalid_argument("pictures of different size cannot be compared: " +
                                     size_text(a) + " and " + size_text(b));
+}
+
+ImageDifference compare_images(const ImageView& a, const ImageView& b) {
+    check_same_size(a, b);
     ImageDifference result;
     double sum = 0.0;
     double sum_of_squares = 0.0;

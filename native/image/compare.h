@@ -20,4 +20,7 @@ struct ImageDifference {
 /// Throws std::invalid_argument where sizes or channels differ.
 ImageDifference compare_images(const ImageView& a, const ImageView& b);
 
+/// Throws std::invalid_argument naming both sizes where width, height or channels differ.
+void check_same_size(const ImageView& a, const ImageView& b);
+
 }  // namespace bvhlab

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// write_image, image_difference.
+// write_image, image_difference, image_error.
 #include <pybind11/stl.h>
 
 #include <stdexcept>
@@ -8,6 +8,7 @@
 
 #ifdef BVHLAB_WITH_OIIO
 #include "image/compare.h"
+#include "image/error.h"
 #include "image/write.h"
 #endif
 
@@ -65,6 +66,25 @@ py::dict difference(const py::object& a, const py::object& b) {
     return result;
 }
 
+py::dict error(const py::object& picture, const py::object& reference) {
+    const Picture first(picture, "picture");
+    const Picture second(reference, "reference");
+    ImageError found;
+    {
+        const py::gil_scoped_release release;
+        found = image_error(first.view(), second.view());
+    }
+    py::dict result;
+    result["relMSE"] = found.relative_mse;
+    result["MAE"] = found.mean_absolute;
+    result["RMSE"] = found.root_mean_square;
+    result["PSNR"] = found.peak_signal_to_noise;
+    result["FLIP"] = found.flip;
+    result["bias"] = found.bias;
+    result["non_finite"] = found.non_finite;
+    return result;
+}
+
 #else
 
 [[noreturn]] void refuse() {
@@ -74,6 +94,9 @@ void write_picture(const py::object&, const py::object&) {
     refuse();
 }
 py::dict difference(const py::object&, const py::object&) {
+    refuse();
+}
+py::dict error(const py::object&, const py::object&) {
     refuse();
 }
 
@@ -94,6 +117,21 @@ with file and reason where it cannot be written.)");
 
 max, mean and rmse are over all values (pixels times channels); a value that is not finite in one of them
 only is infinitely far off. Raises ValueError where the shapes differ.)");
+    module.def(
+        "image_error", &error, py::arg("picture"), py::arg("reference"),
+        R"(How wrong a noisy picture is: dict of relMSE, MAE, RMSE, PSNR, FLIP, bias, non_finite.
+
+Both are (H, W) or (H, W, 1 | 3), linear float32, of one shape; x is a value of the picture, r of the
+reference, m the mean of r; all values count alike.
+
+relMSE      mean of (x - r)^2 / (r^2 + 0.01 m^2)
+MAE, RMSE   mean of |x - r|, and root of the mean of (x - r)^2, in radiance
+PSNR        20 log10(largest r / RMSE) in dB; inf where the pictures are equal
+FLIP        mean LDR-FLIP, 0 to 1 (Andersson et al. 2020, 67 pixels per degree), both shown as x / (x + m)
+bias        mean of x - r, in units of m
+non_finite  values of the picture that are NaN or infinite: they make all else inf, PSNR -inf
+
+Raises ValueError where the shapes differ or the reference holds NaN, infinity or a negative value.)");
 }
 
 }  // namespace bvhlab
