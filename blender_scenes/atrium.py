@@ -108,9 +108,6 @@ def add_lights() -> None:
     warm = (1.0, 0.76, 0.50)
     add_area("lamp east", (HALF_X + 0.6, 0, 4.0), (HALF_X + 1.8, 0, 1.2), (0.8, 1.2), 90, warm)
     add_area("lamp south", (0, -HALF_Y - 1.5, 4.1), (0, -HALF_Y - 1.5, 0), (12.0, 1.0), 260, warm)
-    # A renderer without indirect light sees these two where sunlit floor would light what is above.
-    add_area("bounce court", (0, 0, 0), (0, 0, 1), (15, 7), 280, warm)
-    add_area("bounce south", (0, -HALF_Y - 1.5, 0.2), (0, -HALF_Y - 1.5, 1), (18, 2), 130, warm)
 
 
 def make() -> None:
