@@ -8,9 +8,12 @@ large scenes too (`make test-scenes` does both, with a million rays).
 from __future__ import annotations
 
 import csv
+import hashlib
 import math
 import os
+from collections.abc import Iterator
 from functools import cache
+from itertools import cycle, product
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +21,8 @@ import numpy as np
 import pytest
 from builder_params import ANNEALING, fast_params
 from bvh_lab.native import core
+from bvh_lab.study.core_scene import core_camera
+from bvh_lab.study.framing import auto_cameras
 from bvh_lab.study.plan import Plan
 
 SCENES = Path(__file__).resolve().parents[3] / "shared" / "scenes"
@@ -48,6 +53,7 @@ SLOW = {
     "prbvh_sa": 5e4,
 }
 
+REORDERS = ("off", "aila", "origin", "octahedron", "two_point")
 PAPER = SCENES.parent / "paper" / "bvh_cost.csv"  # Table 3, with c_T = 3, c_I = 2
 PAPER_NAMES = {"crytek_sponza": "CrytekSponza", "sibenik": "Sibenik"}
 OPTIMISERS = ("atrbvh", "prbvh", "prbvh_s", *ANNEALING)
@@ -129,12 +135,38 @@ def count_different(a: Any, b: Any) -> int:
     return int(different.sum())
 
 
+def scene_of_many_models(mesh: Any) -> Any:
+    """The mesh under a lamp and a blue world; its triangles take turns in being of each model."""
+    models = ("diffuse", "principled", "glossy", "glass", "translucent", "transparent")
+    materials = [core.Material([core.Component(model, roughness=0.3)]) for model in models]
+    materials.append(core.Material([core.Component()], emission=(2.0, 1.0, 0.5)))
+    index = np.arange(len(mesh.triangles), dtype=np.uint32) % 61
+    index[index >= len(materials)] = 0
+    lower, upper = mesh.bounds
+    place = np.eye(4)
+    place[:3, 3] = 0.5 * (lower + upper)
+    size = float(np.linalg.norm(upper - lower))
+    lamp = core.Light("point", place, (size**2,) * 3, size_x=0.01 * size)
+    return core.Scene(mesh, materials, index, [lamp], core.World((0.2, 0.3, 0.5)))
+
+
+def picture_hash(bvh: Any, scene: Any, ways: Iterator[tuple[str, int]]) -> str:
+    """SHA-256 of every bit of a small picture, traced in another order and by other threads each
+    time."""
+    reorder, threads = next(ways)
+    camera = core_camera(core, auto_cameras(scene.mesh.vertices)[0])
+    picture = core.render(bvh, scene, camera, 40, 30, depth=4, reorder=reorder, threads=threads)
+    assert float(picture.pixels.max()) > 0.0
+    return hashlib.sha256(picture.pixels.tobytes()).hexdigest()
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_builders_on_a_scene(name: str) -> None:
-    """One answer from all variants, and builders that improve a tree do."""
+    """One answer and one picture from all variants, and builders that improve a tree do."""
     mesh = load(name)
+    scene, ways = scene_of_many_models(mesh), cycle(product(REORDERS, (1, 0)))
     origins, directions = random_rays(mesh, RAYS, seed=1)
-    costs, first = {}, None
+    costs, first, pictures = {}, None, {}
     for builder in [entry["id"] for entry in core.builders()]:
         if not FULL and len(mesh.triangles) > SLOW.get(builder, math.inf):
             continue
@@ -149,6 +181,8 @@ def test_builders_on_a_scene(name: str) -> None:
                 assert count_different(first, hit) == 0, f"{builder} {branching} reorder={reorder}"
             any_hit = core.trace(bvh, origins, directions, any_hit=True)
             assert np.array_equal(any_hit.occluded, first.occluded), f"{builder} {branching} any"
+            pictures[builder, branching] = picture_hash(bvh, scene, ways)
+    assert len(set(pictures.values())) == 1, pictures
     check_order(costs, mesh)
     judge_sample(mesh, first, origins, directions)
 
