@@ -37,6 +37,7 @@ class RenderPanel:
 
 class BVHLAB_PT_compare(RenderPanel, bpy.types.Panel):
     bl_label = "BVH Lab"
+    bl_order = 2  # below the settings of the engine, ours or another
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.scene.bvh_lab
@@ -132,6 +133,9 @@ class BVHLAB_PT_settings(RenderPanel, bpy.types.Panel):
         column = layout.column(heading="Also")
         column.prop(settings, "pictures")
         column.prop(settings, "embree")
+        target = layout.column()
+        target.enabled = settings.pictures
+        target.prop(settings, "target_error")
 
 
 class BVHLAB_UL_variants(bpy.types.UIList):

@@ -3,9 +3,29 @@
 
 from __future__ import annotations
 
-from . import command, handlers, operators, panels, preferences, properties
+from . import (
+    command,
+    engine,
+    engine_panels,
+    engine_settings,
+    handlers,
+    operators,
+    panels,
+    preferences,
+    properties,
+)
 
-MODULES = (preferences, properties, operators, panels, command, handlers)
+MODULES = (
+    preferences,
+    properties,
+    engine_settings,
+    operators,
+    panels,
+    engine,
+    engine_panels,
+    command,
+    handlers,
+)
 
 
 def register() -> None:

@@ -23,9 +23,11 @@ def left_behind() -> list[str]:
         ours = [cls for cls in base.__subclasses__() if "bvh_lab" in cls.__module__]
         found += [cls.__name__ for cls in ours if cls.is_registered]
     found += [f"bpy.ops.bvhlab.{name}" for name in dir(bpy.ops.bvhlab)]
-    for owner in (bpy.types.Scene, bpy.types.WindowManager):
+    for owner in (bpy.types.Scene, bpy.types.ViewLayer, bpy.types.WindowManager):
         if hasattr(owner, "bvh_lab"):
             found.append(f"{owner.__name__}.bvh_lab")
+    if hasattr(bpy.types.Scene, "bvh_lab_render"):
+        found.append("Scene.bvh_lab_render")
     found += [
         f"handler {handler}" for handler in bpy.app.handlers.load_pre if "bvh" in repr(handler)
     ]
