@@ -94,14 +94,6 @@ PathSettings path_settings(std::int64_t depth, std::int64_t shadow_rays) {
             count_argument(shadow_rays, "shadow_rays", 0, most_shadow_rays)};
 }
 
-/// False and True are "off" and "aila", the paper's order.
-Reorder reorder_argument(const py::object& argument) {
-    if (py::isinstance<py::bool_>(argument))
-        return argument.cast<bool>() ? Reorder::aila : Reorder::off;
-    if (py::isinstance<py::str>(argument)) return reorder_named(argument.cast<std::string>());
-    throw py::value_error("reorder must be False, True or the name of an order");
-}
-
 /// A Renderer with what it refers to.
 class PyRenderer {
 public:
@@ -114,7 +106,7 @@ public:
           raster_(raster_argument(width, height, seed)) {
         check_threads(threads);
         RenderOptions options;
-        options.tracer = {path_settings(depth, shadow_rays), reorder_argument(reorder), passes};
+        options.tracer = {path_settings(depth, shadow_rays), reorder_from_python(reorder), passes};
         options.threads = threads;
         check_memory(raster_, Film::bytes_per_pixel(passes), "pictures");
         const py::gil_scoped_release release;
