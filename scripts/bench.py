@@ -3,7 +3,8 @@
 """`make bench`: builders and tracing against Embree and mathutils.bvhtree, on the same rays.
 
 Machines are shared and noisy, so every figure is a ratio to Embree within one round, the median
-over rounds with the quartiles; contenders take turns within a round.
+over rounds with the quartiles; contenders take turns within a round. At the end comes what a
+feature of the renderer costs where no surface uses it (bench_features.py).
 """
 
 from __future__ import annotations
@@ -14,10 +15,12 @@ import time
 from pathlib import Path
 from typing import Any
 
+import bench_features
 import bpy
 import numpy as np
 from bench_build import bench_builds, ratio_text
 from bvh_lab.native import core
+from bvh_lab.study.core_scene import core_scene
 from bvh_lab.study.load import load_mesh_file
 from bvh_lab.study.machine import describe_machine
 from bvh_lab.study.plan import BUILDERS, QUICK_PARAMS, Plan
@@ -137,14 +140,8 @@ def mathutils_speed(scene: Scene, plan: Plan) -> dict[str, float]:
     mesh = core.Mesh(scene.vertices, scene.triangles)
     view = choose_views(core, scene, plan)[0]
     bvh = core.build(mesh, "lbvh")
-    core_scene = core.Scene(
-        mesh,
-        [core.Material([core.Component()])],
-        scene.material_index,
-        [],
-        core.World(scene.world),
-    )
-    generate_rays(core, core_scene, view, bvh, plan, core.Token())
+    made, _ = core_scene(core, mesh, scene)
+    generate_rays(core, made, view, bvh, plan, core.Token())
     speeds: dict[str, float] = {}
     for rays in view.sets:
         if rays.kind in speeds:  # of further bounces
@@ -202,6 +199,9 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("out/bench"))
     parser.add_argument("--builders", default=",".join(BUILDERS), help="e.g. lbvh,sbvh")
     parser.add_argument("--builds-only", action="store_true", help="trace nothing")
+    parser.add_argument(
+        "--no-features", dest="features", action="store_false", help="leave bench_features.py out"
+    )
     parser.add_argument("--repeats", type=int, default=7)
     parser.add_argument("--resolution", default="640x480")
     arguments = parser.parse_args()
@@ -214,6 +214,9 @@ def main() -> int:
         return 2
     for path in scenes:
         bench(path, arguments.out, arguments)
+    if arguments.features and not arguments.builds_only:
+        print(flush=True)
+        return bench_features.main(["--out", str(arguments.out)])
     return 0
 
 

@@ -366,7 +366,7 @@ def parse(words: Sequence[str] | None = None) -> tuple[argparse.Namespace, Plan]
             variant(name)
     except ValueError as error:
         parser.error(str(error))
-    plan.pictures = False
+    plan.pictures = plan.target_error > 0.0  # else the contact sheet and the curves are enough
     missing = [path for path in arguments.scenes if not path.is_file()]
     if missing:
         parser.error(f"there is no file {missing[0]}")

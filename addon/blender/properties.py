@@ -225,6 +225,19 @@ class BVHLAB_PG_settings(bpy.types.PropertyGroup):
         name="Pictures", description="Render a picture with every variant", default=True
     )
 
+    target_error: FloatProperty(
+        name="Target Error",
+        description="Measure how long each variant's picture takes to this relative error (relMSE; "
+        "0.05 is noisy, 0.01 fair); 0 does not. The first time it takes a minute or more, for a "
+        "converged picture to compare with",
+        default=0.0,
+        min=0.0,
+        soft_max=1.0,
+        max=100.0,
+        step=1,
+        precision=3,
+    )
+
     def builders(self) -> list[str]:
         """Ids of the builders switched on, of those that the core offers."""
         offered = [str(builder["id"]) for builder in store.builders()]
@@ -248,6 +261,8 @@ class BVHLAB_PG_settings(bpy.types.PropertyGroup):
                 params["iterations"] = self.annealing
         plan.repeats, plan.judged_rays = self.repeats, self.judged_rays
         plan.embree, plan.pictures = self.embree, self.pictures
+        if self.pictures:  # what is judged
+            plan.target_error = self.target_error
         return plan
 
     def variants(self) -> int:

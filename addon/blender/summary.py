@@ -140,6 +140,9 @@ def details(row: Row) -> list[tuple[str, str]]:
         if None not in work:
             said = zip(work, ("nodes", "boxes", "triangles"), strict=True)
             facts.append(("", f"{', '.join(f'{count:.1f} {name}' for count, name in said)} a ray"))
+    if time := row.time_to_error:
+        text = MISSING if time.seconds is None else f"after {seconds(time.seconds)}"
+        facts.append((f"relMSE {time.target:g}", text))
     errors = row.errors()
     facts.append(("Wrong Hits", wrong_hits(errors.wrong, errors.judged)))
     if row.threads:

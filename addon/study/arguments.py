@@ -10,7 +10,7 @@ from .plan import PRESETS, REORDERS, Plan
 
 NUMBERS = (
     *("samples", "depth", "shadow_rays", "ray_long_side"),
-    *("repeats", "build_repeats", "judged_rays", "seed", "threads"),
+    *("repeats", "build_repeats", "judged_rays", "target_error", "seed", "threads"),
 )
 
 
@@ -76,6 +76,13 @@ def add_plan_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         metavar="N",
         help=f"rays of each view and kind checked by brute force (default: {plan.judged_rays})",
+    )
+    add(
+        "--target-error",
+        type=float,
+        metavar="RELMSE",
+        help="measure the time to this error of the picture, e.g. 0.05; the first time it takes a "
+        "minute or more for the converged reference (default: 0, do not)",
     )
     add("--seed", type=int, metavar="N", help="of all random choices (default: 0)")
     add("--threads", type=int, metavar="N", help="0 means all (default: 0)")

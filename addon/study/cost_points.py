@@ -11,7 +11,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from .correlation import correlate
-from .paper_tables import BASELINE, PAPER_KINDS, Measured
+from .paper_tables import BASELINE, Measured
+from .results import KINDS
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class ScenePoint:
 def cost_points(measured: Measured) -> list[ScenePoint]:
     """A point for each scene, tree, kind and order of rays that LBVH was measured for, too.
 
-    The paper shows those of binary BVHs.
+    The paper shows those of binary BVHs, and no primary rays.
     """
     bases = {
         (t.scene, t.view, t.branching, t.reordered, t.kind): t
@@ -63,7 +64,7 @@ def correlations_text(points: Sequence[ScenePoint], branching: int = 2) -> str:
         f"{'':28s}{'points':>8s}{'Pearson':>10s}{'Spearman':>10s}  least squares",
     ]
     for reordered in (False, True):
-        for kind in PAPER_KINDS:
+        for kind in KINDS:
             of = [
                 p
                 for p in points

@@ -13,6 +13,7 @@ from .machine import usable_cores
 from .plan import Plan
 from .rays import View, most_rays
 from .results import KINDS, Row
+from .target_error import guessed_samples
 
 # One binary tree and its collapse to three branching factors, on two cores.
 BUILD_SECONDS_PER_MILLION = {
@@ -60,6 +61,10 @@ class Estimate:
         paths = self.plan.samples * view.width * view.height / view.rays
         return {"trace": self.trace(rays), "render": SHADING * paths * self.trace(rays)}
 
+    def picture_sample(self, view: View) -> float:
+        """One sample of each pixel of a picture."""
+        return self.view(view)["render"] / self.plan.samples
+
     def judge(self) -> float:
         """Brute force for one kind of ray, all bounces, in one view."""
         return self.plan.judged_rays * self.triangles * JUDGE_SECONDS_PER_TEST / usable_cores()
@@ -78,6 +83,8 @@ class Estimate:
     def planned(self, rows: Iterable[Row], builds: Iterable[str]) -> dict[str, float]:
         """The whole study, per category; ``builds`` names a builder for each tree."""
         total = {"judge": self.judge() * len(KINDS) * len(self.views)}
+        if self.plan.target_error:
+            total["converge"] = self.picture_sample(self.views[0]) * guessed_samples()
         for builder in builds:
             category = f"build {builder}"
             seconds = self.build(builder) * self.plan.build_repeats

@@ -54,30 +54,52 @@ __all__ = [
 def cost_against_time(points: Sequence[ScenePoint], stem: Path) -> None:
     """Figure 1: a panel for each kind of ray, a row of them with and one without reordering.
 
-    Each branching factor has its marker, its line of least squares and its coefficients. Raises
-    ValueError without a point.
+    Each branching factor has its marker, its line of least squares and its coefficients. Primary
+    rays are never reordered: the legend takes the place of that panel. Raises ValueError without a
+    point.
     """
     kinds = list(dict.fromkeys(point.kind for point in points))
     orders = sorted({point.reordered for point in points})
     if not kinds:
         raise ValueError("Figure 1 needs at least one timed tree beside LBVH")
-    panel_height = 0.4 * COLUMN if len(orders) > 1 else 0.5 * COLUMN
-    with drawn(stem, (COLUMN, panel_height * len(orders) + 0.6)) as figure:
+    shape = 0.4 if len(orders) > 1 else 0.5
+    height = COLUMN * max(shape, 0.62 - 0.07 * len(kinds)) * len(orders)
+    with drawn(stem, (COLUMN, height + 0.6)) as figure:
         panels = figure.subplots(len(orders), len(kinds), sharex=True, sharey=True, squeeze=False)
-        for row, reordered in zip(panels, orders, strict=True):
-            for panel, kind in zip(row, kinds, strict=True):
-                _cost_panel(
-                    panel, [p for p in points if (p.kind, p.reordered) == (kind, reordered)]
-                )
-                panel.set_title(f"{kind} rays{', reordered' if reordered else ''}")
-            row[0].set_ylabel("trace time / LBVH's")
-        for panel in panels[-1]:
-            panel.set_xlabel("BVH cost / LBVH's")
+        grid = [
+            [[p for p in points if (p.kind, p.reordered) == (kind, order)] for kind in kinds]
+            for order in orders
+        ]
+        for row, order, of_row in zip(panels, orders, grid, strict=True):
+            for panel, kind, shown in zip(row, kinds, of_row, strict=True):
+                if shown:
+                    _cost_panel(panel, shown)
+                    panel.set_title(f"{kind} rays{', reordered' if order else ''}")
+        _label_outer(panels, grid)
         least, most = panels[0, 0].get_ylim()
         panels[0, 0].set_ylim(least, most + 0.3 * (most - least))  # room for the coefficients
         labels = {point.builder: point.label for point in points}
         entries = builder_legend(labels, [point.branching for point in points])
-        figure.legend(*entries, loc="outside lower center", ncols=legend_columns(len(entries[1])))
+        free = [panels[i, k] for i, row in enumerate(grid) for k, of in enumerate(row) if not of]
+        for panel in free:
+            panel.set_axis_off()
+        if free:
+            free[0].legend(*entries, loc="center", ncols=2)
+        else:
+            columns = legend_columns(len(entries[1]))
+            figure.legend(*entries, loc="outside lower center", ncols=columns)
+
+
+def _label_outer(panels: Any, grid: Sequence[Sequence[Sequence[ScenePoint]]]) -> None:
+    """Axes are labelled where no panel with points is below, or on the left."""
+    for i, row in enumerate(grid):
+        for k in range(len(row)):
+            if not any(below[k] for below in grid[i + 1 :]):
+                panels[i, k].set_xlabel("BVH cost / LBVH's")
+                panels[i, k].tick_params(labelbottom=True)
+            if not any(row[:k]):
+                panels[i, k].set_ylabel("trace time / LBVH's")
+                panels[i, k].tick_params(labelleft=True)
 
 
 def _cost_panel(panel: Any, points: Sequence[ScenePoint]) -> None:

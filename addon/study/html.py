@@ -9,7 +9,7 @@ from html import escape
 from pathlib import Path
 
 from .results import KINDS, Result, Row
-from .table import Column, columns, failures, fastest, header, method
+from .table import Column, columns, failures, fastest, header, method, picture_quality
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #1c2024; --soft: #60646c; --paper: #fcfcfd;
@@ -39,9 +39,17 @@ dt { color: var(--soft); } dd { margin: 0; overflow-wrap: anywhere; }
 """.strip()
 
 
-def html_page(result: Result, files: Mapping[tuple[str, str], str], folder: Path) -> str:
+def html_page(
+    result: Result,
+    files: Mapping[tuple[str, str], str],
+    folder: Path,
+    curves: Path | str = "",
+) -> str:
     """The page. ``files`` names the PNG, relative to ``folder``, of each (variant, view) as
-    `report.write_pictures` returns them; the ones shown are copied into the page."""
+    `report.write_pictures` returns them; the ones shown are copied into the page.
+
+    ``curves`` is the PNG of error against time, or says why there is none.
+    """
     name = escape(result.subject.name)
     failed = "".join(f'<p class="bad">{escape(line)}</p>' for line in failures(result))
     return f"""<!DOCTYPE html>
@@ -59,10 +67,11 @@ def html_page(result: Result, files: Mapping[tuple[str, str], str], folder: Path
 {_paragraphs(header(result), "soft")}
 {failed}
 <h2>What was fastest</h2>
-{_paragraphs(fastest(result))}
+{_paragraphs([*fastest(result), *picture_quality(result)])}
 <h2>All variants</h2>
 {_table(result.rows)}
 {_pictures(result, files, folder)}
+{_error_curves(result, curves)}
 <h2>How it was measured</h2>
 {_list(method(result.plan))}
 <h2>Modelled, approximated, left out</h2>
@@ -144,6 +153,20 @@ def _pictures(result: Result, files: Mapping[tuple[str, str], str], folder: Path
     if not figures:
         return ""
     return f'<h2>Pictures</h2>\n<div class="pictures">\n{"".join(figures)}</div>'
+
+
+def _error_curves(result: Result, curves: Path | str) -> str:
+    if result.convergence is None or not curves:
+        return ""
+    if isinstance(curves, str):
+        shown = _paragraphs([curves], "soft")
+    else:
+        caption = (
+            f"View {result.convergence.view}: relMSE against render time of each builder's fastest "
+            "variant, derived as the times in the table"
+        )
+        shown = _figure(curves, caption)
+    return f"<h2>Error against time</h2>\n{shown}"
 
 
 def _figure(path: Path, caption: str) -> str:

@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from .plan import BRANCHINGS, BUILDERS
-from .results import Result, spread
+from .results import KINDS, Result, spread
 
 BASELINE = "lbvh"
-PAPER_KINDS = ("secondary", "shadow")  # the paper's tables leave primary rays out
+PAPER_KINDS = ("secondary", "shadow")  # the paper's tables and figure leave primary rays out
 WIDTHS = {2: "binary", 4: "quaternary", 8: "octal"}
 
 
@@ -125,7 +125,7 @@ def measured_by(results: Sequence[Result], reorder: str = "aila") -> Measured:
                 )
             if row.reorder not in ("off", reorder):
                 continue
-            for kind in PAPER_KINDS:
+            for kind in KINDS if row.reorder == "off" else PAPER_KINDS:  # primary: never reordered
                 made.traces += [
                     Trace(
                         result.subject.name,

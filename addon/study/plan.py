@@ -75,6 +75,9 @@ class Plan:
     rays of one path for each pixel of a picture whose longer side has ``ray_long_side`` pixels (0:
     as in the picture).
 
+    ``target_error`` is a relMSE: the time that each variant takes to it is measured in the first
+    view, which needs ``pictures`` and a converged reference. 0 measures no such time.
+
     ``repeats`` counts the timed runs after one warm-up; ``build_repeats`` the timed builds.
     ``judged_rays`` are compared with brute force for each view and kind of ray. ``memory_gib``
     bounds the trees held at once (0: half of what is free at the start). ``threads`` 0 means all.
@@ -95,6 +98,7 @@ class Plan:
     shadow_rays: int = 2
     ray_long_side: int = 160
     pictures: bool = True
+    target_error: float = 0.0
     embree: bool = True
     repeats: int = 5
     build_repeats: int = 3
@@ -211,6 +215,13 @@ class Plan:
         _within("samples", self.samples, 1, 65536)
         _within("depth", self.depth, 0, 1024)
         _within("shadow_rays", self.shadow_rays, 0, 64)
+        if self.target_error != 0.0:
+            _within("target_error (0: none)", self.target_error, 1e-5, 100.0)
+            if not self.pictures:
+                raise ValueError(
+                    "target_error is judged by pictures and there are none: choose pictures, "
+                    "or a target_error of 0"
+                )
         _within("repeats", self.repeats, 3, 1000)
         _within("build_repeats", self.build_repeats, 1, 1000)
         _within("judged_rays", self.judged_rays, 0, 1_000_000)

@@ -68,6 +68,10 @@ class Progress:
         self._done[category] += amount
         self._seconds[category] += time.perf_counter() - start
 
+    def replan(self, category: str, amount: float) -> None:
+        """What is left of a category is ``amount`` after all."""
+        self._planned[category] = self._done[category] + amount
+
     def skip(self, amounts: dict[str, float]) -> None:
         """Take work out, per category, that will not be done after all."""
         for category, amount in amounts.items():

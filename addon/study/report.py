@@ -10,20 +10,27 @@ from pathlib import Path
 import numpy as np
 
 from ..native import load
+from .figures import FigureError, error_against_time
 from .html import html_page
+from .image_error import curves_csv
 from .judge import picture_difference
 from .output import file_stems, publish_folder, staged_folder
 from .results import Result
 from .scene import Float32Array
 from .spreadsheet import rays_csv, rows_csv
 from .table import text_report
+from .target_error import error_curves
 
 PICTURES = "pictures"
+CURVES = "error_against_time"
 Pictures = Mapping[tuple[str, str], Float32Array]  # (variant name, view name) -> (H, W, 3)
 
 
 def write_report(result: Result, pictures: Pictures, out: Path) -> None:
     """Write tables (txt, csv), results.json, index.html and pictures/ into the folder ``out``.
+
+    With a target error there are error_against_time.csv, .svg and .png, too; the figures only
+    where matplotlib is.
 
     Everything is written into a new folder beside it and renamed at the end. Raises OSError.
     """
@@ -35,12 +42,13 @@ def write_report(result: Result, pictures: Pictures, out: Path) -> None:
 def fill_report(result: Result, pictures: Pictures, folder: Path) -> None:
     """Write the report's files into a folder that exists."""
     files = write_pictures(result, pictures, folder) if pictures else {}
+    curves = write_curves(result, folder)
     texts = {
         "table.txt": text_report(result),
         "results.csv": rows_csv(result),
         "rays.csv": rays_csv(result),
         "results.json": result.to_json(),
-        "index.html": html_page(result, files, folder),
+        "index.html": html_page(result, files, folder, curves),
     }
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
@@ -83,3 +91,22 @@ def write_pictures(result: Result, pictures: Pictures, folder: Path) -> dict[tup
         core.write_image(str(folder / f"{name}.exr"), difference)
         core.write_image(str(folder / f"{name}.png"), difference / (difference.max() or 1.0))
     return files
+
+
+def write_curves(result: Result, folder: Path) -> Path | str:
+    """Write error against time as CSV and, with matplotlib, as SVG and PNG.
+
+    Returns the PNG's path, a sentence that says why there is none, or "" without a target error.
+    """
+    found, curves = result.convergence, error_curves(result)
+    if found is None or not curves:
+        return ""
+    (folder / f"{CURVES}.csv").write_text(curves_csv(curves), encoding="utf-8")
+    if not any(curve.points for curve in curves):
+        return "There is no finite error to draw."
+    heading = f"{result.subject.name}, view {found.view}"
+    try:
+        error_against_time(curves, folder / CURVES, heading, found.reference_error, found.target)
+    except FigureError as error:
+        return f"The figure is left out, its numbers are in {CURVES}.csv: {error}."
+    return folder / f"{CURVES}.png"

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .convergence import Convergence, TimeToError
 from .plan import Plan
 from .records import from_plain
 
@@ -124,7 +125,8 @@ class Picture:
 
     ``sha256`` is the hash of all pixels, float32. ``largest_difference`` is over all pixels and
     channels, linear; 0 means equal pixel for pixel. ``rays`` counts all that were traced for it, by
-    kind; ``trace_seconds`` is the part of ``seconds`` that tracing them took.
+    kind; ``trace_seconds`` is the part of ``seconds`` that tracing them took. ``errors`` are those
+    to the converged reference, by their names in `core.image_error`, where there is one.
     """
 
     view: str
@@ -137,6 +139,7 @@ class Picture:
     sha256: str
     largest_difference: float
     differing_pixels: int
+    errors: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass
@@ -167,6 +170,7 @@ class Row:
     binary tree) plus ``collapse_seconds``. ``threads`` is what was used. ``error`` is empty unless
     the variant failed; what was measured until then stays. ``group`` numbers the variants that
     were measured interleaved: all are 1 unless the trees did not fit in memory together.
+    ``time_to_error`` is there if the plan asked for it and the variant rendered that view.
     """
 
     name: str
@@ -185,6 +189,7 @@ class Row:
     collapse_seconds: list[float] = field(default_factory=list)
     measurements: list[Measurement] = field(default_factory=list)
     pictures: list[Picture] = field(default_factory=list)
+    time_to_error: TimeToError | None = None
 
     def add_times(self, view: str, kind: str, bounce: int, hits: Any) -> None:
         """Append one repeat's seconds, of what `core.trace` returned, to its measurement."""
@@ -299,7 +304,10 @@ class Machine:
 
 @dataclass
 class Result:
-    """A study's rows and all that must be known to read them."""
+    """A study's rows and all that must be known to read them.
+
+    ``convergence`` is there if the plan has a target error and the study came so far.
+    """
 
     plan: Plan
     subject: Subject
@@ -310,6 +318,7 @@ class Result:
     reference: str = ""  # name of the variant that the others are compared with
     rows: list[Row] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)  # what was added, approximated or left out
+    convergence: Convergence | None = None
     format: int = FORMAT
 
     def failed(self) -> list[Row]:

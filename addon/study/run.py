@@ -41,9 +41,11 @@ from .plan import Plan
 from .progress import Event, Progress, RowChanged, Step
 from .rays import RaySet, View, choose_views, generate_rays, judge_rays
 from .remarks import SLOW_BUILD_SECONDS, iteration_notes, measuring_notes, missing_ray_notes
-from .results import COUNTERS, Measurement, Picture, Result, Row, Subject
+from .results import COUNTERS, Measurement, Picture, Result, Row
 from .scene import Float32Array, Scene
+from .subject import subject_of
 from .table import title
+from .target_error import PictureJudge, Work, check_judge, target_notes
 
 __all__ = ["Event", "RowChanged", "Step", "Study", "compare"]
 
@@ -73,6 +75,7 @@ def compare(
     """
     core = load()
     plan.check(core.builders(), core.devices())
+    check_judge(core, plan)
     token = core.Token() if token is None else token
     return _Runner(core, scene, plan, token, on_event or (lambda event: None), host).run()
 
@@ -90,6 +93,7 @@ class _Runner:
         self.core, self.plan, self.token, self.emit = core, plan, token, emit
         self.mesh = core.Mesh(scene.vertices, scene.triangles)
         self.scene, texture_notes = core_scene(core, self.mesh, scene)
+        self.judge = PictureJudge(core, scene, self.scene)
         self.views = choose_views(core, scene, plan)
         self.jobs = tree_jobs(core, plan)
         self.modes = EMBREE_MODES if plan.embree else ()
@@ -104,7 +108,7 @@ class _Runner:
         self.study = Study(
             Result(
                 plan=copy.deepcopy(plan),
-                subject=_subject(scene, self.scene, self.views),
+                subject=subject_of(scene, self.scene, self.views),
                 machine=describe_machine(core, host),
                 started=datetime.now(UTC).isoformat(timespec="seconds"),
                 notes=[plan.preset_note(), *scene.notes, *texture_notes],
@@ -125,6 +129,7 @@ class _Runner:
         self.result.notes += iteration_notes(self.result.rows)
         self.result.notes += measuring_notes(self.plan, self.group, self.slow_builds)
         self.result.notes += missing_ray_notes(self.result, self.views)
+        self.result.notes += target_notes(self.result)
         self.result.seconds = time.perf_counter() - start
         return self.study
 
@@ -238,6 +243,8 @@ class _Runner:
             self._time(view, contenders)
             if self.plan.pictures:
                 self._render(view, ours)
+            if self.plan.target_error and view is self.views[0]:
+                self._judge_pictures(view, [tree for tree in ours if not tree.row.error])
             for contender in contenders:
                 finished = view is self.views[-1]
                 self.emit(RowChanged(copy.deepcopy(contender.row), finished))
@@ -337,6 +344,17 @@ class _Runner:
                     picture = tree.render(self.scene, view, self.token)
                 self._keep_picture(view, row, picture)
 
+    def _judge_pictures(self, view: View, trees: Sequence[OurTree]) -> None:
+        """Their errors, and the time to the target error. The fastest renders the reference."""
+        if trees:
+            fastest = min(trees, key=lambda tree: tree.row.pictures[0].seconds)
+            with self._failing_alone([fastest.row]):
+                if self.result.convergence is None:
+                    per_sample = self.guess.picture_sample(view)
+                    work = Work(self.progress, per_sample)
+                    self.judge.converge(fastest, view, self.result, work, self.token)
+                self.judge.judge(trees, self.result, self.study.pictures)
+
     def _keep_picture(self, view: View, row: Row, picture: Any) -> None:
         if view.picture is None:
             view.picture = picture.pixels
@@ -379,19 +397,3 @@ class _Runner:
     def _trace_step(self, rays: RaySet, stage: str) -> Iterator[None]:
         with self.progress.step("trace", self.guess.trace(len(rays)), stage):
             yield
-
-
-def _subject(scene: Scene, made: Any, views: Sequence[View]) -> Subject:
-    return Subject(
-        scene.name,
-        scene.source,
-        scene.geometry,
-        scene.frame,
-        len(scene.triangles),
-        len(scene.vertices),
-        len(scene.materials),
-        len(scene.lights),
-        [view.name for view in views],
-        scene.digest(),
-        [name for name, used in made.features.items() if used],
-    )

@@ -67,6 +67,12 @@ def csv_record(row: Row) -> dict[str, Any]:
     record["largest_relative_t_error"] = errors.largest_t_error
     record["differing_rays"] = row.differing_rays()
     record["largest_picture_difference"] = row.picture_difference()
+    time = row.time_to_error
+    record["target_relMSE"] = time.target if time else None
+    record["seconds_to_target_relMSE"] = time.seconds if time else None
+    judged = next((p.errors for p in row.pictures if p.errors), {})
+    for name in ("relMSE", "PSNR"):
+        record[f"picture_{name}"] = judged.get(name)
     record["error"] = row.error
     return record
 

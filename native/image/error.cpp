@@ -69,7 +69,7 @@ double share(double part, double whole) {
 
 }  // namespace
 
-ImageError image_error(const ImageView& picture, const ImageView& reference) {
+ImageError image_error(const ImageView& picture, const ImageView& reference, bool with_flip) {
     check(picture, reference);
     const auto x = values_of(picture), r = values_of(reference);
     const auto non_finite =
@@ -94,7 +94,7 @@ ImageError image_error(const ImageView& picture, const ImageView& reference) {
     error.root_mean_square = std::sqrt(squares / count);
     error.peak_signal_to_noise =
         squares == 0.0 ? infinity : 20.0 * std::log10(peak / error.root_mean_square);
-    error.flip = r.empty() ? 0.0 : mean_flip(picture, reference, mean);
+    if (with_flip && !r.empty()) error.flip = mean_flip(picture, reference, mean);
     error.bias = share(sum / count, mean);
     return error;
 }

@@ -21,6 +21,7 @@ struct ImageError {
     double peak_signal_to_noise =
         0.0;  ///< dB below the reference's largest value; infinite if equal
     /// Mean LDR-FLIP, 0 to 1 (flip.h), of both pictures after the same tone mapping: x / (x + m).
+    /// 0 where it was not asked for.
     double flip = 0.0;
     double bias = 0.0;           ///< mean of x - r, in units of m
     std::size_t non_finite = 0;  ///< values of the picture that are NaN or infinite
@@ -30,7 +31,7 @@ inline constexpr double relative_mse_epsilon = 0.01;
 
 /// Compares a picture with its reference. Throws std::invalid_argument where sizes or channels
 /// differ, there are not 1 or 3 channels, or the reference holds a value that is not finite or is
-/// negative.
-ImageError image_error(const ImageView& picture, const ImageView& reference);
+/// negative. FLIP takes most of the time: a second for a million pixels.
+ImageError image_error(const ImageView& picture, const ImageView& reference, bool with_flip = true);
 
 }  // namespace bvhlab

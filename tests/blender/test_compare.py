@@ -82,7 +82,9 @@ class Compare(EmptySceneTest):
         settings.use_2 = settings.use_4 = False
         settings.use_reordering, settings.reorder_key = True, "octahedron"
         settings.geometry, settings.embree = "render", False
-        settings.pictures = False
+        settings.target_error = 0.25
+        self.assertEqual(settings.plan().target_error, 0.25)
+        settings.pictures = False  # and so no error that could be judged
         bpy.ops.bvhlab.compare()
         result = self.study().result
         self.assertEqual([row.name for row in result.rows], ["lbvh_8", "lbvh_8_octahedron"])

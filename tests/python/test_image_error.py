@@ -103,3 +103,10 @@ def test_shapes_must_fit() -> None:
         core.image_error(np.ones((4, 4, 4), np.float32), np.ones((4, 4, 4), np.float32))
     with pytest.raises(ValueError, match="picture must be an array of numbers"):
         core.image_error("no picture", pattern(4, 4))
+
+
+def test_flip_can_be_left_out() -> None:
+    picture, reference = pattern(10, 10), pattern(10, 10) + np.float32(0.1)
+    whole = core.image_error(picture, reference)
+    assert whole.pop("FLIP") > 0.0
+    assert core.image_error(picture, reference, flip=False) == whole

@@ -95,7 +95,12 @@ def line(of: Table, branching: int, statistic: str, scene: str = "") -> Line:
 
 def test_only_our_rows_that_work_count(measured: Measured) -> None:
     assert measured.builders == ["lbvh", "sah"] and measured.scenes == ["hall", "hair"]
-    assert {t.kind for t in measured.traces} == {"secondary", "shadow"}
+    assert {t.kind for t in measured.traces if not t.reordered} == {
+        "primary",
+        "secondary",
+        "shadow",
+    }
+    assert {t.kind for t in measured.traces if t.reordered} == {"secondary", "shadow"}
     assert max(t.mrays for t in measured.traces) == pytest.approx(4.0 * 1.25)  # none by origin
 
 
@@ -186,7 +191,8 @@ def test_points_are_relative_to_lbvh_in_the_same_order(measured: Measured) -> No
     points = {
         (p.scene, p.builder, p.kind, p.reordered, p.branching): p for p in cost_points(measured)
     }
-    assert len(points) == 2 * 2 * 2 * 2 * 2
+    assert len(points) == 2 * 2 * 2 * (3 + 2)  # scenes, builders, widths; primary rays unsorted
+    assert points["hall", "sah", "primary", False, 2].time == pytest.approx(0.5)
     for reordered in (False, True):
         hall = points["hall", "sah", "secondary", reordered, 2]
         assert (hall.cost, hall.time, hall.label) == (0.5, pytest.approx(0.5), "SAH")
@@ -194,8 +200,9 @@ def test_points_are_relative_to_lbvh_in_the_same_order(measured: Measured) -> No
         assert points["hair", "lbvh", "shadow", reordered, 2].time == 1.0
     text = correlations_text(cost_points(measured))
     assert text.count("least squares") == 1 and "shadow rays, reordered" in text
+    assert "primary rays " in text and "primary rays, reordered" not in text
     rows = list(csv.DictReader(io.StringIO(cost_points_csv(cost_points(measured)))))
-    assert len(rows) == 32 and float(rows[0]["cost"]) == cost_points(measured)[0].cost
+    assert len(rows) == 40 and float(rows[0]["cost"]) == cost_points(measured)[0].cost
 
 
 def test_correlation_of_a_line_and_of_its_square() -> None:

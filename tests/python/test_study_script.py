@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import subprocess
 import sys
@@ -10,7 +11,10 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("bpy", reason="the study of .blend files needs the bpy module")
+# Not imported here: other tests of this process are about what works without bpy.
+pytestmark = pytest.mark.skipif(
+    importlib.util.find_spec("bpy") is None, reason="the study of .blend files needs the bpy module"
+)
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 
 BOX = """
