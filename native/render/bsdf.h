@@ -74,6 +74,7 @@ public:
         return {direction, seen ? color_ : glm::vec3(0.0F), local.z / pi_f, false, false};
     }
 
+    const glm::vec3& normal() const { return shading_normal_; }
     glm::vec3 albedo() const { return color_; }
     bool scatters() const { return color_ != glm::vec3(0.0F); }
     bool only_delta() const { return false; }
@@ -114,6 +115,8 @@ public:
     /// Takes a lobe by `choice` and draws a direction from it by `random`, all in [0, 1].
     BsdfSample sample(const glm::vec2& random, float choice) const;
 
+    /// The shading normal, tilted where it had to be.
+    const glm::vec3& normal() const { return frame_.z; }
     /// Share of light that is reflected or goes through, about; for the albedo pass.
     glm::vec3 albedo() const { return albedo_; }
     /// Otherwise it is black, and paths end.

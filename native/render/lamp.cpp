@@ -9,6 +9,7 @@
 
 #include "render/sample_shapes.h"
 #include "render/spherical_rectangle.h"
+#include "scene/color.h"
 
 namespace bvhlab {
 namespace {
@@ -42,13 +43,21 @@ Lamp::Lamp(const Light& light)
       edge_y_(light.size_y * axis(light, 1)),
       strength_(light.color),
       extent_(light.size_x),
+      luminance_(luminance(light.color)),
       spot_edge_(std::cos(0.5 * light.spot_angle)),
       spot_blended_((1.0 - spot_edge_) * light.spot_blend) {
-    if (kind_ == LightKind::point || kind_ == LightKind::spot) strength_ /= 4.0 * pi;
     if (kind_ != LightKind::point) back_ = glm::normalize(axis(light, 2));
+    if (kind_ == LightKind::point || kind_ == LightKind::spot) {
+        strength_ /= 4.0 * pi;
+        luminance_ /= 4.0 * pi;
+    }
     if (kind_ == LightKind::sun)
         extent_ = light.size_x > smallest_angle ? sagitta(light.size_x) : 0.0;
     if (kind_ != LightKind::area) return;
+
+    size_ = {glm::length(edge_x_), glm::length(edge_y_)};
+    if (size_.x > 0.0) unit_x_ = edge_x_ / size_.x;
+    if (size_.y > 0.0) unit_y_ = edge_y_ / size_.y;
 
     // Sheared lamps shine along the normal of their parallelogram.
     const glm::dvec3 cross = glm::cross(edge_x_, edge_y_);
@@ -57,6 +66,7 @@ Lamp::Lamp(const Light& light)
     right_angled_ = std::abs(glm::dot(edge_x_, edge_y_)) <= 1e-6 * area;
     extent_ = ellipse_ ? 0.25 * pi * area : area;
     strength_ /= pi * extent_;
+    luminance_ /= pi * extent_;
 }
 
 LightSample Lamp::sample(const glm::dvec3& position, const glm::dvec2& random) const {
@@ -72,15 +82,16 @@ LightSample Lamp::sample(const glm::dvec3& position, const glm::dvec2& random) c
     return {};
 }
 
-bool Lamp::meet(const glm::dvec3& position, const glm::dvec3& direction, LampHit& hit) const {
+bool Lamp::meet(const glm::dvec3& position, const glm::dvec3& direction, LampHit& hit,
+                double t_max) const {
     switch (kind_) {
         case LightKind::point:
         case LightKind::spot:
-            return meet_disk_lamp(position, direction, hit);
+            return meet_disk_lamp(position, direction, hit, t_max);
         case LightKind::sun:
-            return meet_sun(direction, hit);
+            return meet_sun(direction, hit, t_max);
         case LightKind::area:
-            return meet_area(position, direction, hit);
+            return meet_area(position, direction, hit, t_max);
     }
     return false;
 }
@@ -113,12 +124,12 @@ LightSample Lamp::sample_disk_lamp(const glm::dvec3& position, const glm::dvec2&
     return sample;
 }
 
-bool Lamp::meet_disk_lamp(const glm::dvec3& position, const glm::dvec3& direction,
-                          LampHit& hit) const {
+bool Lamp::meet_disk_lamp(const glm::dvec3& position, const glm::dvec3& direction, LampHit& hit,
+                          double t_max) const {
     const glm::dvec3 to_centre = centre_ - position;
     const double squared = glm::dot(to_centre, to_centre);
     const double along = glm::dot(to_centre, direction);
-    if (!(along > 0.0)) return false;
+    if (!(along > 0.0) || squared > t_max * along) return false;
     // The disk's plane is squared / along away; there, the ray passes the centre at distance
     // |to_centre| tan(angle), and cross = |to_centre| sin(angle).
     const glm::dvec3 cross = glm::cross(to_centre, direction);
@@ -139,7 +150,8 @@ LightSample Lamp::sample_sun(const glm::dvec2& random) const {
             extent_ > 0.0 ? 0.5 / (pi * extent_) : 0.0};
 }
 
-bool Lamp::meet_sun(const glm::dvec3& direction, LampHit& hit) const {
+bool Lamp::meet_sun(const glm::dvec3& direction, LampHit& hit, double t_max) const {
+    if (t_max < std::numeric_limits<double>::infinity()) return false;
     const glm::dvec3 chord = direction - back_;
     if (glm::dot(chord, chord) > 2.0 * extent_) return false;
     hit = {strength_ / (pi * extent_ * (2.0 - extent_)), std::numeric_limits<double>::infinity(),
@@ -159,8 +171,8 @@ LightSample Lamp::sample_area(const glm::dvec3& position, const glm::dvec2& rand
     if (!(height > 0.0)) return sample;
 
     if (is_drawn_by_solid_angle(squared_distance)) {
-        const SphericalRectangle seen(sample.to_light - 0.5 * (edge_x_ + edge_y_), edge_x_,
-                                      edge_y_);
+        const SphericalRectangle seen(sample.to_light - 0.5 * (edge_x_ + edge_y_), unit_x_, unit_y_,
+                                      size_);
         if (!(seen.solid_angle() > 0.0)) return sample;
         sample.to_light = seen.sample(random);
         sample.irradiance = strength_ * seen.solid_angle();
@@ -177,13 +189,15 @@ LightSample Lamp::sample_area(const glm::dvec3& position, const glm::dvec2& rand
     return sample;
 }
 
-bool Lamp::meet_area(const glm::dvec3& position, const glm::dvec3& direction, LampHit& hit) const {
+bool Lamp::meet_area(const glm::dvec3& position, const glm::dvec3& direction, LampHit& hit,
+                     double t_max) const {
     const double slope = glm::dot(direction, back_);
     if (!(slope > 0.0)) return false;
     const glm::dvec3 to_centre = centre_ - position;
     const double height = glm::dot(to_centre, back_);
     if (!(height > 0.0)) return false;
     const double distance = height / slope;
+    if (distance > t_max) return false;
     const glm::dvec3 place = direction * distance - to_centre;
 
     // Coordinates along the edges, -0.5 to 0.5; cross products, as edges may be sheared.
@@ -197,7 +211,8 @@ bool Lamp::meet_area(const glm::dvec3& position, const glm::dvec3& direction, La
     hit.radiance = strength_;
     hit.distance = distance;
     if (is_drawn_by_solid_angle(squared_distance)) {
-        const SphericalRectangle seen(to_centre - 0.5 * (edge_x_ + edge_y_), edge_x_, edge_y_);
+        const SphericalRectangle seen(to_centre - 0.5 * (edge_x_ + edge_y_), unit_x_, unit_y_,
+                                      size_);
         if (!(seen.solid_angle() > 0.0)) return false;
         hit.pdf = 1.0 / seen.solid_angle();
         return true;
@@ -205,6 +220,46 @@ bool Lamp::meet_area(const glm::dvec3& position, const glm::dvec3& direction, La
     if (!(extent_ > smallest_angle * smallest_angle * squared_distance)) return false;
     hit.pdf = distance * distance / (extent_ * slope);
     return true;
+}
+
+// --- brightness ----------------------------------------------------------------------------------
+
+double Lamp::brightness(const glm::dvec3& position, const glm::dvec3& normal) const {
+    if (kind_ == LightKind::area) return brightness_of_area(centre_ - position, normal);
+    if (kind_ != LightKind::sun) return brightness_of_disk(centre_ - position, normal);
+    if (normal == glm::dvec3(0.0)) return luminance_;
+    // The sine of its radius is at most sqrt(2 extent).
+    return luminance_ * std::clamp(glm::dot(normal, back_) + std::sqrt(2.0 * extent_), 0.0, 1.0);
+}
+
+double Lamp::brightness_of_disk(const glm::dvec3& to_centre, const glm::dvec3& normal) const {
+    const double squared = glm::dot(to_centre, to_centre);
+    if (!(squared > 0.0)) return 0.0;
+    const double distance = std::sqrt(squared);
+    double facing = 1.0;
+    if (kind_ == LightKind::spot && extent_ == 0.0) facing = spot_mask(-to_centre / distance);
+    if (normal != glm::dvec3(0.0))
+        facing *= std::clamp((glm::dot(normal, to_centre) + extent_) / distance, 0.0, 1.0);
+    return luminance_ * facing / (squared + extent_ * extent_);
+}
+
+/// As if all of it were at its nearest point, but for what a disk of this area on the axis brings
+/// at most.
+double Lamp::brightness_of_area(const glm::dvec3& to_centre, const glm::dvec3& normal) const {
+    const double height = glm::dot(to_centre, back_);
+    if (!(height > 0.0)) return 0.0;
+    double facing = 1.0;
+    if (normal != glm::dvec3(0.0)) {
+        const double half =
+            0.5 * (std::abs(glm::dot(normal, edge_x_)) + std::abs(glm::dot(normal, edge_y_)));
+        const double highest = glm::dot(normal, to_centre) + half;
+        if (!(highest > 0.0)) return 0.0;
+        facing = std::min(1.0, highest / glm::length(to_centre));
+    }
+    const double x = std::max(0.0, std::abs(glm::dot(to_centre, unit_x_)) - 0.5 * size_.x);
+    const double y = std::max(0.0, std::abs(glm::dot(to_centre, unit_y_)) - 0.5 * size_.y);
+    const double squared = height * height + x * x + y * y;
+    return luminance_ * extent_ * facing * height / (std::sqrt(squared) * (squared + extent_ / pi));
 }
 
 }  // namespace bvhlab

@@ -3,6 +3,7 @@
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <limits>
 
 #include "scene/light.h"
 
@@ -49,17 +50,26 @@ public:
     LightSample sample(const glm::dvec3& position, const glm::dvec2& random) const;
 
     /// What `sample` draws at `position`, found by a ray from there in the unit `direction`.
-    /// Whether the ray meets the lamp's shining side; fills `hit`.
-    bool meet(const glm::dvec3& position, const glm::dvec3& direction, LampHit& hit) const;
+    /// Whether the ray meets the lamp's shining side, no farther than `t_max`; fills `hit`.
+    bool meet(const glm::dvec3& position, const glm::dvec3& direction, LampHit& hit,
+              double t_max = std::numeric_limits<double>::infinity()) const;
+
+    /// About the irradiance (luminance of it, W/m2) that it brings, where nothing is in between, to
+    /// a surface at `position` that faces in the direction of the unit vector `normal`; or faces
+    /// the lamp, where `normal` is 0. It is 0 only where the lamp does bring none.
+    double brightness(const glm::dvec3& position, const glm::dvec3& normal) const;
 
 private:
     LightSample sample_disk_lamp(const glm::dvec3& position, const glm::dvec2& random) const;
     LightSample sample_sun(const glm::dvec2& random) const;
     LightSample sample_area(const glm::dvec3& position, const glm::dvec2& random) const;
-    bool meet_disk_lamp(const glm::dvec3& position, const glm::dvec3& direction,
-                        LampHit& hit) const;
-    bool meet_sun(const glm::dvec3& direction, LampHit& hit) const;
-    bool meet_area(const glm::dvec3& position, const glm::dvec3& direction, LampHit& hit) const;
+    bool meet_disk_lamp(const glm::dvec3& position, const glm::dvec3& direction, LampHit& hit,
+                        double t_max) const;
+    bool meet_sun(const glm::dvec3& direction, LampHit& hit, double t_max) const;
+    bool meet_area(const glm::dvec3& position, const glm::dvec3& direction, LampHit& hit,
+                   double t_max) const;
+    double brightness_of_disk(const glm::dvec3& to_centre, const glm::dvec3& normal) const;
+    double brightness_of_area(const glm::dvec3& to_centre, const glm::dvec3& normal) const;
     double spot_mask(const glm::dvec3& away) const;
     bool is_drawn_by_solid_angle(double squared_distance) const;
 
@@ -68,10 +78,13 @@ private:
     glm::dvec3 centre_;
     glm::dvec3 back_;             ///< unit vector against the direction in which the lamp shines
     glm::dvec3 edge_x_, edge_y_;  ///< of an area
+    glm::dvec3 unit_x_{0.0}, unit_y_{0.0};  ///< along them
+    glm::dvec2 size_{0.0};                  ///< their lengths
     /// Radiant intensity (point, spot), irradiance (sun) or radiance (area).
     glm::dvec3 strength_;
     /// Radius (point, spot), 1 - cosine of the angular radius (sun) or surface area (area).
     double extent_;
+    double luminance_;                 ///< of strength_
     double spot_edge_, spot_blended_;  ///< cosine at the cone's edge, and its part that fades out
 };
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <numeric>
 
 #include "base/parallel.h"
 #include "render/bsdf.h"
@@ -57,92 +58,156 @@ double mean_emission(const Scene& scene, const Material& material) {
 }  // namespace
 
 LightSampler::LightSampler(const Scene& scene) : scene_(&scene) {
-    add_near();
-    add_distant();
+    add_lamps();
+    add_emitters();
+    add_world();
 
-    // Divide the samples between the groups.
-    const bool near = near_.total() > 0.0, distant = distant_.total() > 0.0;
-    near_share_ = near ? (distant ? 0.5 : 1.0) : 0.0;
-    distant_share_ = distant ? 1.0 - near_share_ : 0.0;
-    for (double& density : emitter_density_) density *= near_share_;
-    world_probability_ *= distant_share_;
+    // Odds by power alone.
+    compared_ = lamps_.all.size() + suns_.all.size() + 2 <= LightOdds::most;
+    emitters_entry_ = compared_ ? lamps_.all.size() : 1;
+    world_entry_ = compared_ ? emitters_entry_ + 1 + suns_.all.size() : 3;
+    const double near = lamps_.power + emitters_.power;
+    const double distant = suns_.power + world_brightness_;
+    const double near_share = near > 0.0 ? (distant > 0.0 ? 0.5 : 1.0) / near : 0.0;
+    const double distant_share = distant > 0.0 ? (near > 0.0 ? 0.5 : 1.0) / distant : 0.0;
+    always_.add(near_share * lamps_.power);
+    always_.add(near_share * emitters_.power);
+    always_.add(distant_share * suns_.power);
+    always_.add(distant_share * world_brightness_);
 
-    if (!scene.features.gloss) return;
-    for (std::size_t i = 0; i < lamps_.size(); ++i)
-        if (lamps_[i].has_extent())
-            extended_.push_back({lamps_[i], near_share_ * near_.probability(i)});
-    for (std::size_t i = 0; i < suns_.size(); ++i)
-        if (suns_[i].has_extent())
-            extended_.push_back({suns_[i], distant_share_ * distant_.probability(i)});
+    if (scene.features.gloss) add_extended();
 }
 
-void LightSampler::add_near() {
-    std::vector<double> powers;
+void LightSampler::add_lamps() {
+    std::vector<double> powers, irradiances;
     for (const Light& light : scene_->lights) {
-        if (light.kind == LightKind::sun || is_black(light.color)) continue;
-        lamps_.emplace_back(light);
-        powers.push_back(power_of(light));
+        if (is_black(light.color)) continue;
+        const bool sun = light.kind == LightKind::sun;
+        (sun ? suns_ : lamps_).all.emplace_back(light);
+        if (sun)
+            irradiances.push_back(luminance(light.color));
+        else
+            powers.push_back(power_of(light));
     }
+    lamps_.by_power = distribution_of(powers, largest_of(powers));
+    lamps_.power = std::reduce(powers.begin(), powers.end());
+    suns_.by_power = distribution_of(irradiances, largest_of(irradiances));
+    suns_.power = std::reduce(irradiances.begin(), irradiances.end());
+}
 
-    // A point on an emitting triangle is drawn with a density that follows its radiance alone.
+/// A point on an emitting triangle is drawn with a density that follows its radiance alone.
+void LightSampler::add_emitters() {
+    std::vector<double>& density = emitters_.density;
     for (const Material& material : scene_->materials)
-        emitter_density_.push_back(2.0 * pi * mean_emission(*scene_, material));
+        density.push_back(2.0 * pi * mean_emission(*scene_, material));
+    if (!scene_->features.emitters) return;
     const Mesh& mesh = *scene_->mesh;
     const auto power_of_triangle = [&](std::size_t i) {
-        return emitter_density_[scene_->material_index[i]] * area_of(mesh.triangle(i));
+        return density[scene_->material_index[i]] * area_of(mesh.triangle(i));
     };
-    if (scene_->features.emitters)
-        emitters_ = compact(mesh.size(), Token(),
-                            [&](std::size_t i) { return power_of_triangle(i) > 0.0; });
-    for (const std::uint32_t triangle : emitters_) powers.push_back(power_of_triangle(triangle));
+    emitters_.triangles =
+        compact(mesh.size(), Token(), [&](std::size_t i) { return power_of_triangle(i) > 0.0; });
+    std::vector<double> powers;
+    for (const std::uint32_t triangle : emitters_.triangles)
+        powers.push_back(power_of_triangle(triangle));
+    find_emitters_place(powers);
 
     const double largest = largest_of(powers);
-    near_ = distribution_of(powers, largest);
-    for (double& density : emitter_density_)
-        density = density > 0.0 ? density / (largest * near_.total()) : 0.0;
+    emitters_.by_power = distribution_of(powers, largest);
+    for (double& value : density)
+        value = value > 0.0 ? value / (largest * emitters_.by_power.total()) : 0.0;
 }
 
-/// Suns by their irradiance, and the world by the mean of what it could bring.
-void LightSampler::add_distant() {
-    std::vector<double> powers;
-    for (const Light& light : scene_->lights) {
-        if (light.kind != LightKind::sun || is_black(light.color)) continue;
-        suns_.emplace_back(light);
-        powers.push_back(luminance(light.color));
+/// How much power, and the ball it comes from.
+void LightSampler::find_emitters_place(const std::vector<double>& powers) {
+    const Mesh& mesh = *scene_->mesh;
+    emitters_.power = std::reduce(powers.begin(), powers.end());
+    for (std::size_t i = 0; i < powers.size(); ++i) {
+        const Triangle triangle = mesh.triangle(emitters_.triangles[i]);
+        const glm::dvec3 middle =
+            (glm::dvec3(triangle.a) + glm::dvec3(triangle.b) + glm::dvec3(triangle.c)) / 3.0;
+        emitters_.centre += middle * (powers[i] / emitters_.power);
     }
-    double world = luminance(scene_->world.color);
-    if (scene_->features.environment) {
-        environment_.emplace(*scene_);
-        world = environment_->mean_luminance();
+    for (const std::uint32_t index : emitters_.triangles) {
+        const Triangle triangle = mesh.triangle(index);
+        for (const glm::vec3& corner : {triangle.a, triangle.b, triangle.c})
+            emitters_.radius =
+                std::max(emitters_.radius, glm::distance(glm::dvec3(corner), emitters_.centre));
     }
-    powers.push_back(pi * world);
-
-    distant_ = distribution_of(powers, largest_of(powers));
-    if (distant_.total() > 0.0) world_probability_ = distant_.probability(suns_.size());
 }
 
-LightSample LightSampler::sample(const glm::dvec3& position, const glm::dvec3& normal,
-                                 std::uint32_t index, std::uint32_t count, double choice,
-                                 const glm::dvec2& random) const {
-    const double place = (double(index) + choice) / double(count);
-    if (place < near_share_) return sample_near(position, place / near_share_, random);
-    return sample_distant(position, normal, (place - near_share_) / distant_share_, random);
+/// A constant world counts half: directions drawn from the BSDF find it as well as light samples,
+/// and mostly it is hidden (on the atrium, that is 5% less variance than in full).
+void LightSampler::add_world() {
+    world_brightness_ = 0.5 * pi * luminance(scene_->world.color);
+    if (!scene_->features.environment) return;
+    environment_.emplace(*scene_);
+    world_brightness_ = pi * environment_->mean_luminance();
 }
 
-LightSample LightSampler::sample_near(const glm::dvec3& position, double choice,
-                                      const glm::dvec2& random) const {
-    const std::size_t chosen = near_.choose(choice).index;
-    if (chosen >= lamps_.size())
-        return sample_emitter(position, emitters_[chosen - lamps_.size()], random);
-    return sample_lamp(lamps_[chosen], near_share_ * near_.probability(chosen), position, random);
+void LightSampler::add_extended() {
+    const auto add = [&](const Lamps& lamps, std::size_t first_entry, std::size_t entry) {
+        for (std::size_t i = 0; i < lamps.all.size(); ++i) {
+            if (!lamps.all[i].has_extent()) continue;
+            if (compared_)
+                extended_.push_back({lamps.all[i], first_entry + i, 1.0});
+            else
+                extended_.push_back({lamps.all[i], entry, lamps.by_power.probability(i)});
+        }
+    };
+    add(lamps_, 0, 0);
+    add(suns_, emitters_entry_ + 1, 2);
 }
 
-LightSample LightSampler::sample_distant(const glm::dvec3& position, const glm::dvec3& normal,
-                                         double choice, const glm::dvec2& random) const {
-    const std::size_t chosen = distant_.choose(choice).index;
-    if (chosen == suns_.size()) return sample_world(normal, random);
-    return sample_lamp(suns_[chosen], distant_share_ * distant_.probability(chosen), position,
+// --- odds ----------------------------------------------------------------------------------------
+
+LightOdds LightSampler::odds(const glm::dvec3& position, const glm::dvec3& normal) const {
+    if (!compared_) return always_;
+    const glm::dvec3 facing = scene_->features.transmission ? glm::dvec3(0.0) : normal;
+    LightOdds odds;
+    for (const Lamp& lamp : lamps_.all) odds.add(lamp.brightness(position, facing));
+    odds.add(emitters_brightness(position, facing));
+    for (const Lamp& sun : suns_.all) odds.add(sun.brightness(position, facing));
+    odds.add(world_brightness_);
+    return odds;
+}
+
+/// As Lamp::brightness(): of a ball that shines in all directions.
+double LightSampler::emitters_brightness(const glm::dvec3& position,
+                                         const glm::dvec3& normal) const {
+    if (emitters_.triangles.empty()) return 0.0;
+    const glm::dvec3 to_centre = emitters_.centre - position;
+    const double squared = glm::dot(to_centre, to_centre), radius = emitters_.radius;
+    const double highest = glm::dot(normal, to_centre) + radius;
+    if (normal != glm::dvec3(0.0) && !(highest > 0.0)) return 0.0;
+    return emitters_.power / (4.0 * pi * (squared + radius * radius));
+}
+
+// --- samples -------------------------------------------------------------------------------------
+
+LightSample LightSampler::sample(const LightOdds& odds, const glm::dvec3& position,
+                                 const glm::dvec3& normal, std::uint32_t index, std::uint32_t count,
+                                 double choice, const glm::dvec2& random) const {
+    const auto [entry, rest] = odds.choose((double(index) + choice) / double(count));
+    if (entry == world_entry_) return sample_world(odds, normal, random);
+    if (entry == emitters_entry_) {
+        const std::size_t chosen = emitters_.by_power.choose(rest).index;
+        return sample_emitter(odds, position, emitters_.triangles[chosen], random);
+    }
+    const double probability = odds.probability(entry);
+    const bool sun = entry > emitters_entry_;
+    const Lamps& lamps = sun ? suns_ : lamps_;
+    if (!compared_) return sample_one_of(lamps, probability, rest, position, random);
+    return sample_lamp(lamps.all[sun ? entry - emitters_entry_ - 1 : entry], probability, position,
                        random);
+}
+
+LightSample LightSampler::sample_one_of(const Lamps& lamps, double probability, double choice,
+                                        const glm::dvec3& position,
+                                        const glm::dvec2& random) const {
+    const std::size_t chosen = lamps.by_power.choose(choice).index;
+    return sample_lamp(lamps.all[chosen], probability * lamps.by_power.probability(chosen),
+                       position, random);
 }
 
 LightSample LightSampler::sample_lamp(const Lamp& lamp, double probability,
@@ -154,8 +219,8 @@ LightSample LightSampler::sample_lamp(const Lamp& lamp, double probability,
 }
 
 /// A point uniformly by area, a little off the triangle, so that it is not in its own shadow.
-LightSample LightSampler::sample_emitter(const glm::dvec3& position, std::uint32_t triangle,
-                                         const glm::dvec2& random) const {
+LightSample LightSampler::sample_emitter(const LightOdds& odds, const glm::dvec3& position,
+                                         std::uint32_t triangle, const glm::dvec2& random) const {
     const double root = std::sqrt(random.x);
     const double u = root * (1.0 - random.y), v = root * random.y;
     const Triangle corners = scene_->mesh->triangle(triangle);
@@ -165,35 +230,40 @@ LightSample LightSampler::sample_emitter(const glm::dvec3& position, std::uint32
     const double distance = glm::length(sample.to_light);
     const double towards = -glm::dot(sample.to_light, point.normal);
     if (!(distance > 0.0 && towards > 0.0)) return sample;
-    sample.pdf = emitter_pdf(triangle, distance, towards / distance);
+    sample.pdf = emitter_pdf(odds, triangle, distance, towards / distance);
     const glm::vec2 uv =
         scene_->features.textures ? uv_at(*scene_, triangle, float(u), float(v)) : glm::vec2(0.0F);
     sample.irradiance = glm::dvec3(emission(*scene_, triangle, uv)) / sample.pdf;
     return sample;
 }
 
-double LightSampler::emitter_pdf(std::uint32_t triangle, double distance, double cosine) const {
-    const double density = emitter_density_[scene_->material_index[triangle]];
-    return density > 0.0 ? density * distance * distance / std::abs(cosine) : 0.0;
+double LightSampler::emitter_pdf(const LightOdds& odds, std::uint32_t triangle, double distance,
+                                 double cosine) const {
+    const double density = emitters_.density[scene_->material_index[triangle]];
+    if (!(density > 0.0)) return 0.0;
+    return odds.probability(emitters_entry_) * density * distance * distance / std::abs(cosine);
 }
 
 /// By the texture, or in proportion to the cosine where all directions are as bright.
-LightSample LightSampler::sample_world(const glm::dvec3& normal, const glm::dvec2& random) const {
+LightSample LightSampler::sample_world(const LightOdds& odds, const glm::dvec3& normal,
+                                       const glm::dvec2& random) const {
     if (environment_) {
         const EnvironmentSample drawn = environment_->sample(random);
         if (!(drawn.pdf > 0.0)) return {drawn.direction, true};
-        const double pdf = world_probability_ * drawn.pdf;
+        const double pdf = odds.probability(world_entry_) * drawn.pdf;
         return {drawn.direction, true, glm::dvec3(drawn.radiance) / pdf, pdf};
     }
     const glm::dvec3 direction = sample_cosine(normal, random);
-    const double pdf = world_pdf(normal, direction);
+    const double pdf = world_pdf(odds, normal, direction);
     if (!(pdf > 0.0)) return {direction, true};
     return {direction, true, glm::dvec3(scene_->world.color) / pdf, pdf};
 }
 
-double LightSampler::world_pdf(const glm::dvec3& normal, const glm::dvec3& direction) const {
-    if (environment_) return world_probability_ * environment_->pdf(direction);
-    return world_probability_ * std::max(0.0, glm::dot(normal, direction)) / pi;
+double LightSampler::world_pdf(const LightOdds& odds, const glm::dvec3& normal,
+                               const glm::dvec3& direction) const {
+    const double probability = odds.probability(world_entry_);
+    if (environment_) return probability * environment_->pdf(direction);
+    return probability * std::max(0.0, glm::dot(normal, direction)) / pi;
 }
 
 }  // namespace bvhlab

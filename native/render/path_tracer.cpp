@@ -164,8 +164,10 @@ void PathTracer::scatter() {
     const Timed timed(seconds, Stage::shade);
     if (wave_.bounce == 0 && options_.passes) fill_depth();
     wave_.light.resize(wave_.paths.size() * options_.paths.shadow_rays);
-    parallel_for_each(wave_.paths.size(), grain, *token_,
-                      [&](std::size_t i) { shader_.scatter(wave_, i); });
+    parallel_for_each(wave_.paths.size(), grain, *token_, [&](std::size_t i) {
+        shader_.prefetch(wave_, i);
+        shader_.scatter(wave_, i);
+    });
 }
 
 /// Pass values that tracing tells; shading adds the others where there is a surface.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <optional>
 
 #include "render/bsdf.h"
 #include "render/interpolate.h"
@@ -66,13 +67,20 @@ float Shader::bsdf_weight(float pdf, double light_pdf) const {
     return float(1.0 / (1.0 + ratio * ratio));
 }
 
+/// With which lights were drawn at the point that the ray of path `i` left.
+LightOdds Shader::odds_before(const Paths& paths, std::size_t i) const {
+    const glm::dvec3 behind = double(paths.travelled[i]) * glm::dvec3(paths.directions[i]);
+    return lights_.odds(glm::dvec3(paths.origins[i]) - behind, glm::dvec3(paths.normals[i]));
+}
+
 /// Radiance of the world where the ray of path `i` meets nothing.
 glm::vec3 Shader::seen_world(const Wave& wave, std::size_t i) const {
     const glm::dvec3 direction(wave.paths.directions[i]);
     const glm::vec3 radiance = lights_.world_radiance(direction);
     const float pdf = wave.paths.pdf[i];
     if (pdf == 0.0F) return radiance;
-    const double light_pdf = lights_.world_pdf(glm::dvec3(wave.paths.normals[i]), direction);
+    const double light_pdf =
+        lights_.world_pdf(odds_before(wave.paths, i), glm::dvec3(wave.paths.normals[i]), direction);
     return radiance * bsdf_weight(pdf, light_pdf);
 }
 
@@ -86,8 +94,8 @@ glm::vec3 Shader::seen_emission(const Wave& wave, std::size_t i) const {
     const glm::dvec3 direction(wave.paths.directions[i]);
     const SurfacePoint point = hit_point(scene_, hits, i, direction);
     const double distance = double(wave.paths.travelled[i]) + double(hits.t[i]);
-    const double light_pdf =
-        lights_.emitter_pdf(triangle, distance, glm::dot(point.normal, direction));
+    const double light_pdf = lights_.emitter_pdf(odds_before(wave.paths, i), triangle, distance,
+                                                 glm::dot(point.normal, direction));
     return radiance * bsdf_weight(pdf, light_pdf);
 }
 
@@ -97,9 +105,15 @@ glm::vec3 Shader::seen_lamps(const Wave& wave, std::size_t i) const {
     const glm::dvec3 direction(paths.directions[i]);
     const double travelled = paths.travelled[i];
     const float pdf = paths.pdf[i];
+    std::optional<LightOdds> odds;
+    const auto find_odds = [&]() -> const LightOdds& {
+        if (!odds) odds = odds_before(paths, i);
+        return *odds;
+    };
     glm::vec3 radiance(0.0F);
     lights_.for_lamps_met(glm::dvec3(paths.origins[i]) - travelled * direction, direction,
-                          travelled, travelled + double(wave.hits.t[i]), [&](const LampHit& lamp) {
+                          travelled, travelled + double(wave.hits.t[i]), find_odds,
+                          [&](const LampHit& lamp) {
                               const float weight = pdf == 0.0F ? 1.0F : bsdf_weight(pdf, lamp.pdf);
                               radiance += glm::vec3(lamp.radiance) * weight;
                           });
@@ -170,11 +184,11 @@ void Shader::pass_shadow(LightPaths& light, std::size_t i, const Hits& hits,
 
 template <bool textured, bool gloss>
 void Shader::sample_light(Wave& wave, std::size_t i, const Vertex<textured, gloss>& vertex,
-                          std::uint32_t index) const {
+                          const LightOdds& odds, std::uint32_t index) const {
     const std::uint32_t count = settings_.shadow_rays;
     const LightSample sample = lights_.sample(
-        vertex.point.position, glm::dvec3(vertex.normal), index, count, vertex.choice.y,
-        vertex.random.pair(vertex.dimension + first_shadow_pair + index));
+        odds, vertex.point.position, glm::dvec3(vertex.bsdf.normal()), index, count,
+        vertex.choice.y, vertex.random.pair(vertex.dimension + first_shadow_pair + index));
     const double distance = glm::length(sample.to_light);
     if (!(distance > 0.0)) return;
     const BsdfValue bsdf = vertex.bsdf.evaluate(glm::vec3(sample.to_light / distance));
@@ -204,9 +218,28 @@ void Shader::sample_direction(Wave& wave, std::size_t i,
     paths.throughput[i] *= sample.weight;
     paths.origins[i] = offset_origin(vertex.point, glm::dvec3(sample.direction));
     paths.directions[i] = sample.direction;
-    paths.normals[i] = vertex.normal;
+    paths.normals[i] = vertex.bsdf.normal();
     paths.pdf[i] = sample.delta ? 0.0F : sample.pdf;
     paths.travelled[i] = 0.0F;
+}
+
+void Shader::prefetch(const Wave& wave, std::size_t i) const {
+    constexpr std::size_t far = 16, near = 8;
+    const Array<std::uint32_t>& met = wave.hits.triangle;
+    if (i + far < met.size() && met[i + far] != no_triangle) {
+        const std::uint32_t triangle = met[i + far];
+        __builtin_prefetch(&scene_.mesh->triangles[triangle]);
+        __builtin_prefetch(&scene_.material_index[triangle]);
+        if (scene_.features.smooth) {
+            __builtin_prefetch(&scene_.normals[3 * std::size_t(triangle)]);
+            __builtin_prefetch(&scene_.normals[3 * std::size_t(triangle) + 2].z);
+        }
+    }
+    if (i + near < met.size() && met[i + near] != no_triangle) {
+        const glm::uvec3& corners = scene_.mesh->triangles[met[i + near]];
+        for (int corner = 0; corner < 3; ++corner)
+            __builtin_prefetch(&scene_.mesh->vertices[corners[corner]]);
+    }
 }
 
 template <bool textured, bool gloss>
@@ -245,8 +278,11 @@ void Shader::scatter_as(Wave& wave, std::size_t i) const {
     }
 
     // Look for light, then go on.
-    if (vertex.bsdf.scatters() && !vertex.bsdf.only_delta() && !lights_.empty())
-        for (std::uint32_t index = 0; index < count; ++index) sample_light(wave, i, vertex, index);
+    if (vertex.bsdf.scatters() && !vertex.bsdf.only_delta() && !lights_.empty() && count > 0) {
+        const LightOdds odds = lights_.odds(point.position, glm::dvec3(vertex.bsdf.normal()));
+        for (std::uint32_t index = 0; index < count && !odds.empty(); ++index)
+            sample_light(wave, i, vertex, odds, index);
+    }
     if (vertex.bsdf.scatters() && (wave.bounce < settings_.depth || bsdf_finds_light()))
         sample_direction(wave, i, vertex);
     else

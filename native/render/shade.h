@@ -33,6 +33,10 @@ public:
     /// throughput makes up for the paths that did. Call see() first.
     bool pass_through(Wave& wave, std::size_t i, std::uint32_t layer) const;
 
+    /// Fetches what scatter() needs of the surfaces that the paths after `i` have met: they lie all
+    /// over the memory, and waiting for them takes a fifth of the time otherwise.
+    void prefetch(const Wave& wave, std::size_t i) const;
+
     /// Takes path `i` from its hit to its next ray: fills pass values and light paths on the way
     /// and turns the throughput black where the path ends.
     void scatter(Wave& wave, std::size_t i) const { (this->*scatter_)(wave, i); }
@@ -49,10 +53,11 @@ private:
     void scatter_as(Wave& wave, std::size_t i) const;
     template <bool textured, bool gloss>
     void sample_light(Wave& wave, std::size_t i, const Vertex<textured, gloss>& vertex,
-                      std::uint32_t index) const;
+                      const LightOdds& odds, std::uint32_t index) const;
     template <bool textured, bool gloss>
     void sample_direction(Wave& wave, std::size_t i, const Vertex<textured, gloss>& vertex) const;
 
+    LightOdds odds_before(const Paths& paths, std::size_t i) const;
     glm::vec3 seen_world(const Wave& wave, std::size_t i) const;
     glm::vec3 seen_emission(const Wave& wave, std::size_t i) const;
     glm::vec3 seen_lamps(const Wave& wave, std::size_t i) const;

@@ -216,15 +216,16 @@ TEST(Environment, ConstantWorldIsDrawnByTheCosine) {
     const Scene scene = make_scene(parts);
     const LightSampler lights(scene);
     const glm::dvec3 normal = glm::normalize(glm::dvec3(1, -2, 0.5));
+    const LightOdds odds = lights.odds({1, 2, 3}, normal);
     for (std::uint32_t i = 0; i < 64; ++i) {
         const Sampler random(0, i, 0);
         const LightSample sample =
-            lights.sample({1, 2, 3}, normal, 0, 1, random.pair(1).x, random.pair(0));
+            lights.sample(odds, {1, 2, 3}, normal, 0, 1, random.pair(1).x, random.pair(0));
         EXPECT_TRUE(sample.distant);
         EXPECT_NEAR(sample.irradiance.x * glm::dot(sample.to_light, normal), 2.0 * pi, 1e-6);
-        EXPECT_NEAR(sample.pdf, lights.world_pdf(normal, sample.to_light), 1e-12);
+        EXPECT_NEAR(sample.pdf, lights.world_pdf(odds, normal, sample.to_light), 1e-12);
     }
-    EXPECT_EQ(lights.world_pdf(normal, -normal), 0.0);
+    EXPECT_EQ(lights.world_pdf(odds, normal, -normal), 0.0);
     EXPECT_EQ(lights.world_radiance(-normal), glm::vec3(2.0F));
 }
 

@@ -59,7 +59,8 @@ SceneParts parts(Material first, Material second) {
 LightSample draw(const LightSampler& lights, std::uint32_t i, std::uint32_t index = 0,
                  std::uint32_t count = 1) {
     const Sampler random(0, i, 0);
-    return lights.sample(origin, up, index, count, random.pair(1).x, random.pair(0));
+    return lights.sample(lights.odds(origin, up), origin, up, index, count, random.pair(1).x,
+                         random.pair(0));
 }
 
 double cosine(const LightSample& sample) {
@@ -105,22 +106,24 @@ struct Sky {
 Sky look_everywhere(const Scene& scene, const LightSampler& lights, std::uint32_t directions) {
     Sky sky;
     const double solid_angle = 2.0 * pi / directions;
+    const LightOdds odds = lights.odds(origin, up);
     for (std::uint32_t i = 0; i < directions; ++i) {
         const glm::dvec3 direction = sample_cone(up, 1.0, Sampler(0, i, 0).pair(0));
         double radiance = double(lights.world_radiance(direction).x);
-        double density = lights.world_pdf(up, direction);
+        double density = lights.world_pdf(odds, up, direction);
         for (std::uint32_t triangle = 0; triangle < scene.mesh->size(); ++triangle) {
             double distance, u, v;
             const Triangle corners = scene.mesh->triangle(triangle);
             if (!meets(corners, direction, distance, u, v)) continue;
             radiance += double(scene.material(triangle).emission.value.x);
-            density += lights.emitter_pdf(triangle, distance, facing(corners, direction));
+            density += lights.emitter_pdf(odds, triangle, distance, facing(corners, direction));
         }
-        lights.for_lamps_met(origin, direction, 0.0, std::numeric_limits<double>::infinity(),
-                             [&](const LampHit& hit) {
-                                 radiance += hit.radiance.x;
-                                 density += hit.pdf;
-                             });
+        lights.for_lamps_met(
+            origin, direction, 0.0, std::numeric_limits<double>::infinity(), [&] { return odds; },
+            [&](const LampHit& hit) {
+                radiance += hit.radiance.x;
+                density += hit.pdf;
+            });
         sky.irradiance += radiance * direction.z * solid_angle;
         sky.density += density * solid_angle;
     }
@@ -158,12 +161,13 @@ TEST(Lights, DensitiesOfDrawnDirectionsAreThoseOfMetOnes) {
     given.world.color = glm::vec3(0.7F);
     const Scene scene = make_scene(given);
     const LightSampler lights(scene);
+    const LightOdds odds = lights.odds(origin, up);
     int near = 0;
     for (std::uint32_t i = 0; i < 256; ++i) {
         const LightSample sample = draw(lights, i);
         const glm::dvec3 direction = glm::normalize(sample.to_light);
         if (sample.distant) {
-            EXPECT_NEAR(sample.pdf, lights.world_pdf(up, direction), 1e-9 * sample.pdf);
+            EXPECT_NEAR(sample.pdf, lights.world_pdf(odds, up, direction), 1e-9 * sample.pdf);
             continue;
         }
         ++near;
@@ -174,45 +178,105 @@ TEST(Lights, DensitiesOfDrawnDirectionsAreThoseOfMetOnes) {
             // Both may be met, of which the sample is on one.
             if (!meets(corners, direction, distance, u, v)) continue;
             if (std::abs(distance - glm::length(sample.to_light)) > 1e-4) continue;
-            found = lights.emitter_pdf(triangle, distance, facing(corners, direction));
+            found = lights.emitter_pdf(odds, triangle, distance, facing(corners, direction));
         }
         EXPECT_NEAR(found, sample.pdf, 1e-4 * sample.pdf);
     }
-    EXPECT_EQ(near, 128);
+    EXPECT_GT(near, 16);
+    EXPECT_LT(near, 240);
 }
 
-TEST(Lights, TwoSamplesAreOneOfEachGroup) {
-    SceneParts given = parts(emitter(5), Material{});
-    given.lights = lamps_with_extent();
-    given.world.color = glm::vec3(0.01F);
+/// How often each light is drawn at the origin, as a share.
+std::vector<double> shares(const std::vector<Light>& lights, const glm::dvec3& normal,
+                           const Material& material = {}) {
+    SceneParts given = parts(material, material);
+    given.lights = lights;
     const Scene scene = make_scene(given);
-    const LightSampler lights(scene);
-    for (std::uint32_t i = 0; i < 64; ++i) {
-        EXPECT_FALSE(draw(lights, i, 0, 2).distant);
-        EXPECT_TRUE(draw(lights, i, 1, 2).distant);
+    const LightSampler sampler(scene);
+    const LightOdds odds = sampler.odds(origin, normal);
+    std::vector<double> found(lights.size(), 0.0);
+    for (std::uint32_t i = 0; i < 1024 && !odds.empty(); ++i) {
+        const LightSample sample =
+            sampler.sample(odds, origin, normal, 0, 1, i / 1024.0, {0.5, 0.5});
+        for (std::size_t k = 0; k < lights.size(); ++k) {
+            const bool sun = lights[k].kind == LightKind::sun;
+            const glm::dvec3 place(lights[k].to_world[sun ? 2 : 3]);
+            if (sample.distant == sun && glm::distance(sample.to_light, place) < 1e-6)
+                found[k] += 1.0 / 1024.0;
+        }
     }
+    return found;
 }
 
-TEST(Lights, ChoiceFollowsPower) {
-    const auto share_of_second = [](std::vector<Light> lights) {
-        SceneParts given = parts(Material{}, Material{});
-        given.lights = std::move(lights);
-        const Scene scene = make_scene(given);
-        const LightSampler sampler(scene);
-        int second = 0;
-        for (std::uint32_t i = 0; i < 1024; ++i)
-            second += sampler.sample(origin, up, 0, 1, i / 1024.0, {0.5, 0.5}).to_light.x == 2.0;
-        return second / 1024.0;
-    };
-    const Light point = lamp(LightKind::point, 10, {1, 0, 1});
-    EXPECT_NEAR(share_of_second({point, lamp(LightKind::point, 30, {2, 0, 1})}), 0.75, 2e-3);
-    Light area = lamp(LightKind::area, 30, {2, 0, 1});
-    area.size_x = area.size_y = 1e-9;
-    EXPECT_GT(share_of_second({point, area}), 0.0);
-    Light spot = lamp(LightKind::spot, 30, {2, 0, 1});
-    spot.spot_angle = 2.0 * pi / 3.0;  // a quarter of the sphere
-    EXPECT_NEAR(share_of_second({point, spot}), 7.5 / 17.5, 2e-3);
-    EXPECT_EQ(share_of_second({point, lamp(LightKind::point, 0, {2, 0, 1})}), 0.0);
+TEST(Lights, ChoiceFollowsThePowerThatArrives) {
+    const Light point = lamp(LightKind::point, 10, {0, 0, 1});
+    // 30 W twice as far away bring 30 / 4, of which half at a cosine of 0.5.
+    const Light other = lamp(LightKind::point, 30, {0, 2 * std::sqrt(0.75), 1});
+    EXPECT_NEAR(shares({point, other}, up)[1], 3.75 / 13.75, 2e-3);
+    // Area lamps send more along their axis: P / pi, where points send P / (4 pi).
+    Light area = lamp(LightKind::area, 10, {0, 0, 2});
+    area.size_x = area.size_y = 1e-3;
+    EXPECT_NEAR(shares({point, area}, up)[1], 0.5, 2e-3);
+    area.to_world = glm::rotate(area.to_world, pi, glm::dvec3(1, 0, 0));
+    EXPECT_EQ(shares({point, area}, up)[1], 0.0);  // shines away
+    // A sun of 1 W/m2 is as bright as 4 pi W at a distance of 1.
+    const Light sun = lamp(LightKind::sun, 10 / (4 * pi), {0, 0, 0});
+    EXPECT_NEAR(shares({point, sun}, up)[1], 0.5, 2e-3);
+    Light spot = lamp(LightKind::spot, 10, {0, 0, 1});
+    spot.spot_angle = 1.0;
+    EXPECT_NEAR(shares({other, spot}, up)[1], 10 / 13.75, 2e-3);
+    spot.to_world = glm::rotate(spot.to_world, 1.0, glm::dvec3(1, 0, 0));
+    EXPECT_EQ(shares({other, spot}, up)[1], 0.0);
+    EXPECT_EQ(shares({point, lamp(LightKind::point, 0, {2, 0, 1})}, up)[1], 0.0);
+}
+
+TEST(Lights, WhatIsBehindASurfaceIsLeftOutUnlessLightGoesThrough) {
+    const std::vector<Light> lights{lamp(LightKind::point, 10, {0, 0, 1}),
+                                    lamp(LightKind::point, 10, {0, 1e-9, -1})};
+    EXPECT_EQ(shares(lights, up), (std::vector<double>{1.0, 0.0}));
+    EXPECT_EQ(shares({lights[1]}, up), std::vector<double>{0.0});
+    Component thin;
+    thin.model = Model::translucent;
+    EXPECT_NEAR(shares(lights, up, {{thin}, {}})[1], 0.5, 2e-3);
+}
+
+TEST(Lights, NoLampThatBringsLightIsLeftOut) {
+    std::vector<Light> lights = lamps_with_extent();
+    Light spot = lamp(LightKind::spot, 10, {0.2, 0.1, 1});
+    spot.spot_angle = 1.0;
+    for (const double radius : {0.0, 0.5}) {
+        spot.size_x = radius;
+        lights.push_back(spot);
+    }
+    Light disk = lights[2];
+    disk.shape = LightShape::disk;
+    disk.to_world[0] += 0.5 * disk.to_world[1];  // sheared
+    lights.push_back(disk);
+    int lit = 0;
+    for (std::uint32_t i = 0; i < 1 << 14; ++i) {
+        const Sampler random(0, i, 0);
+        const glm::dvec3 position(4.0 * random.pair(0) - 2.0, 4.0 * random.pair(1).x - 2.0);
+        const glm::dvec3 normal = sample_cone(up, 2.0, random.pair(2));
+        for (const Light& light : lights) {
+            const Lamp seen(light);
+            const LightSample sample = seen.sample(position, random.pair(3));
+            if (sample.irradiance.x * glm::dot(normal, sample.to_light) <= 0.0) continue;
+            ++lit;
+            EXPECT_GT(seen.brightness(position, normal), 0.0);
+            EXPECT_GT(seen.brightness(position, glm::dvec3(0.0)), 0.0);
+        }
+    }
+    EXPECT_GT(lit, 10000);
+}
+
+TEST(Lights, ManyLampsAreDrawnByPowerAndShareWithDistantLights) {
+    std::vector<Light> lights;
+    for (int i = 0; i < 20; ++i) lights.push_back(lamp(LightKind::point, 1 + i, {1 + i, 0, 1}));
+    lights.push_back(lamp(LightKind::sun, 5, {0, 0, 0}));
+    const std::vector<double> found = shares(lights, up);
+    for (std::size_t i = 0; i < 20; ++i)
+        EXPECT_NEAR(found[i], 0.5 * double(1 + i) / 210.0, 2e-3) << i;
+    EXPECT_NEAR(found[20], 0.5, 2e-3);
 }
 
 TEST(Lights, WhereNothingShinesThereIsNothingToSample) {
@@ -270,7 +334,7 @@ TEST(Lights, TexturedEmissionIsLookedUpAtThePoint) {
         expected += 2.0 * double(look_up(*texture, uv).x) * direction.z * 2.0 * pi / directions;
     }
     EXPECT_NEAR(irradiance(lights, 1), expected, 5e-3 * expected);
-    EXPECT_EQ(lights.emitter_pdf(1, 2.0, 1.0), 0.0);
+    EXPECT_EQ(lights.emitter_pdf(lights.odds(origin, up), 1, 2.0, 1.0), 0.0);
 }
 
 TEST(Lights, ManyEmittersAreDrawnByPower) {
