@@ -77,9 +77,10 @@ def _extract(
     world = scene.world.evaluated_get(depsgraph) if scene.world else None
     background = read_world(world, textures, notes)
     emits = any(material.emits for material in materials.found)
-    if fill_in and not lights and not emits and max(background.color) == 0.0:
-        background = WHITE
-        notes.fact("no lamp, no emissive material and a black world: lit by a white one")
+    if not lights and not emits and max(background.color) == 0.0:
+        dark = "no lamp, no emissive material and a black world"
+        notes.fact(f"{dark}: " + ("lit by a white one" if fill_in else "the picture is black"))
+        background = WHITE if fill_in else background
     extracted = Scene(
         name=name,
         vertices=found.vertices,

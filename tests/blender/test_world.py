@@ -121,6 +121,13 @@ class Worlds(EmptySceneTest):
         self.assertEqual(scene.world.color, (1.0, 1.0, 1.0))
         self.assertTrue(any("lit by a white one" in note for note in scene.notes))
 
+    def test_no_light_in_a_render_is_said(self) -> None:
+        from bvh_lab.blender.extract import extract_as_is
+
+        scene = extract_as_is(bpy.context.evaluated_depsgraph_get(), "viewport")
+        self.assertEqual(scene.world.color, (0.0, 0.0, 0.0))
+        self.assertTrue(any("the picture is black" in note for note in scene.notes))
+
     def test_a_world_is_light_enough(self) -> None:
         world = bpy.data.worlds.new("World")
         use_nodes(world)
