@@ -3,29 +3,24 @@
 
 blender --factory-startup --enable-event-simulate --python panel_in_blender.py -- BUILD OUT
 
-Writes OUT/seen.json and screenshots. Steps are a generator: each ``yield`` lets Blender handle
-events.
+Writes OUT/seen.json and screenshots.
 """
 
 from __future__ import annotations
 
-import json
 import sys
 import time
-import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 
-BUILD, OUT = (Path(word) for word in sys.argv[sys.argv.index("--") + 1 :])
+sys.path.insert(0, str(Path(__file__).parent))
+from ui_support import BUILD, play, screenshot, seen, wait_for, window_region
+
 sys.path.insert(0, str(BUILD))
 import bvh_lab
 from bvh_lab.blender import store, summary
-
-TICK_SECONDS = 0.03
-PATIENCE_SECONDS = 120.0
-seen: dict[str, object] = {}
 
 
 def prepare() -> None:
@@ -54,10 +49,6 @@ def split_screen() -> tuple[bpy.types.Area, bpy.types.Area]:
     return left, right
 
 
-def window_region(area: bpy.types.Area) -> bpy.types.Region:
-    return next(region for region in area.regions if region.type == "WINDOW")
-
-
 def move_mouse(x: int, y: int) -> None:
     bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
 
@@ -82,14 +73,6 @@ def find_button(area: bpy.types.Area, command: str, share: float = 0.5) -> Itera
     raise AssertionError(f"no button runs {command}")
 
 
-def wait_for(what: str, condition: Callable[[], bool]) -> Iterator[None]:
-    end = time.monotonic() + PATIENCE_SECONDS
-    while not condition():
-        if time.monotonic() > end:
-            raise AssertionError(f"waited {PATIENCE_SECONDS} s in vain until {what}")
-        yield
-
-
 def scroll_to_end(area: bpy.types.Area) -> Iterator[None]:
     region = window_region(area)
     for _ in range(3):
@@ -98,13 +81,6 @@ def scroll_to_end(area: bpy.types.Area) -> Iterator[None]:
                 bpy.ops.view2d.scroll_down(deltay=2000)
         area.tag_redraw()
         yield
-
-
-def screenshot(name: str) -> Iterator[None]:
-    for _ in range(8):  # let the panel be drawn
-        yield
-    bpy.ops.screen.screenshot(filepath=str(OUT / name))
-    yield
 
 
 def steps() -> Iterator[None]:
@@ -162,21 +138,5 @@ def steps() -> Iterator[None]:
     yield from screenshot("5_sorted.png")
 
 
-def run() -> float | None:
-    try:
-        next(script)
-        return TICK_SECONDS
-    except StopIteration:
-        pass
-    except BaseException:
-        seen["error"] = traceback.format_exc()
-        bpy.ops.screen.screenshot(filepath=str(OUT / "error.png"))
-    bvh_lab.unregister()
-    (OUT / "seen.json").write_text(json.dumps(seen, indent=1))
-    bpy.ops.wm.quit_blender()
-    return None
-
-
 prepare()
-script = steps()
-bpy.app.timers.register(run, first_interval=0.5)
+play(steps(), bvh_lab.unregister)

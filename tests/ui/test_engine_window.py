@@ -3,20 +3,14 @@
 
 from __future__ import annotations
 
-import json
 import os
-import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
+from window import what_blender_saw
 
-REPOSITORY = Path(__file__).resolve().parents[2]
-BUILD = Path(os.environ.get("BVHLAB_BUILD", REPOSITORY / "build"))
-SCRIPT = Path(__file__).with_name("engine_in_blender.py")
-BLENDER = shutil.which("blender", path="/usr/bin")
 WIDTH, HEIGHT = 720, 540
 VIEWS = ("4_viewport", "5_turned", "6_moved", "7_hidden", "8_camera")
 
@@ -26,24 +20,7 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> dict:
     """What the script saw; its folder, with the screenshots, stands under "folder"."""
     shots = os.environ.get("BVHLAB_SCREENSHOTS")
     folder = Path(shots, "engine") if shots else tmp_path_factory.mktemp("engine")
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "seen.json").unlink(missing_ok=True)
-    screen = f"-screen 0 {WIDTH}x{HEIGHT}x24"
-    command = ["xvfb-run", "-a", "-s", screen, str(BLENDER), "--factory-startup", "-noaudio"]
-    command += ["--window-geometry", "0", "0", str(WIDTH), str(HEIGHT), "--python-exit-code", "1"]
-    command += ["--python", str(SCRIPT), "--", str(BUILD), str(folder)]
-    environment = {
-        **os.environ,
-        "LIBGL_ALWAYS_SOFTWARE": "1",
-        "BLENDER_USER_RESOURCES": str(folder),
-    }
-    run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
-    assert (folder / "seen.json").is_file(), f"{run.returncode}\n{run.stdout}\n{run.stderr}"
-    seen = json.loads((folder / "seen.json").read_text())
-    assert "error" not in seen, f"{seen['error']}\nscreenshots: {folder}"
-    assert run.returncode == 0, run.stderr
-    assert "Traceback" not in run.stdout + run.stderr, run.stdout + run.stderr
-    return {**seen, "folder": folder}
+    return what_blender_saw("engine_in_blender.py", folder, WIDTH, HEIGHT)
 
 
 def picture(seen: dict, name: str) -> np.ndarray:

@@ -3,17 +3,12 @@
 
 from __future__ import annotations
 
-import json
 import os
-import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
+from window import what_blender_saw
 
-REPOSITORY = Path(__file__).resolve().parents[2]
-BUILD = Path(os.environ.get("BVHLAB_BUILD", REPOSITORY / "build"))
-SCRIPT = Path(__file__).with_name("panel_in_blender.py")
 # Every builder but those that take minutes on a scene of usual size.
 SWITCHED_ON = (
     "lbvh",
@@ -27,28 +22,13 @@ SWITCHED_ON = (
     "trbvh",
     "hybrid",
 )
-BLENDER = shutil.which("blender", path="/usr/bin")
 
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory: pytest.TempPathFactory) -> dict:
     """What the script saw; its folder, with the screenshots, stands under "folder"."""
     folder = Path(os.environ.get("BVHLAB_SCREENSHOTS") or tmp_path_factory.mktemp("panel"))
-    command = ["xvfb-run", "-a", "-s", "-screen 0 1280x900x24", str(BLENDER), "--factory-startup"]
-    command += ["-noaudio", "--enable-event-simulate", "--window-geometry", "0", "0", "1280", "900"]
-    command += ["--python-exit-code", "1", "--python", str(SCRIPT), "--", str(BUILD), str(folder)]
-    environment = {
-        **os.environ,
-        "LIBGL_ALWAYS_SOFTWARE": "1",
-        "BLENDER_USER_RESOURCES": str(folder),
-    }
-    run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
-    assert (folder / "seen.json").is_file(), f"{run.returncode}\n{run.stdout}\n{run.stderr}"
-    seen = json.loads((folder / "seen.json").read_text())
-    assert "error" not in seen, f"{seen['error']}\nscreenshots: {folder}"
-    assert run.returncode == 0, run.stderr
-    assert "Traceback" not in run.stdout + run.stderr, run.stdout + run.stderr
-    return {**seen, "folder": folder}
+    return what_blender_saw("panel_in_blender.py", folder, 1280, 900, "--enable-event-simulate")
 
 
 def test_progress_while_it_runs(seen: dict) -> None:

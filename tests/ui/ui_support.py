@@ -20,7 +20,7 @@ import bpy
 BUILD, OUT = (Path(word) for word in sys.argv[sys.argv.index("--") + 1 :])
 
 TICK_SECONDS = 0.03
-PATIENCE_SECONDS = 60.0
+PATIENCE_SECONDS = 120.0
 seen: dict[str, object] = {}
 
 
