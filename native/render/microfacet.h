@@ -77,14 +77,9 @@ inline float masking_shadowing(float cos_o, float cos_i, float alpha) {
            (cos_i * smith_term(cos_o, alpha) + cos_o * smith_term(cos_i, alpha));
 }
 
-/// Density by solid angle of the microfacet normals that o sees.
-inline float visible_density(const glm::vec3& o, const glm::vec3& h, float alpha) {
-    return ggx_density(h, alpha) * masking(o.z, alpha) * std::max(0.0F, glm::dot(o, h)) / o.z;
-}
-
-/// One of them: `stretched` is o as a surface of alpha 1 would see it, `turn` a unit vector of
-/// uniform angle and `height` uniform in [0, 1] (Dupuy & Benyoub 2023, "Sampling Visible GGX
-/// Normals with Spherical Caps").
+/// A microfacet normal that o sees: `stretched` is o as a surface of alpha 1 would see it, `turn` a
+/// unit vector of uniform angle and `height` uniform in [0, 1] (Dupuy & Benyoub 2023, "Sampling
+/// Visible GGX Normals with Spherical Caps").
 inline glm::vec3 visible_normal(const glm::vec3& stretched, float alpha, const glm::vec2& turn,
                                 float height) {
     const float z = (1.0F - height) * (1.0F + stretched.z) - stretched.z;

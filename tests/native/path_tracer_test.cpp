@@ -146,8 +146,7 @@ TEST(PathTracer, InsideAClosedBoxThatEmitsEverywhereLightIsUniform) {
     EXPECT_NEAR(ours, 1.0 / (1.0 - 0.5), 4e-3);
 }
 
-// --- light samples against directions drawn from the BSDF
-// ------------------------------------------
+// --- light samples against BSDF directions -------------------------------------------------------
 
 Material of_model(Model model, float roughness, float color = 1.0F) {
     Component component;
