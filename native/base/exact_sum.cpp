@@ -7,6 +7,7 @@
 namespace bvhlab {
 
 void ExactSum::add(double value) {
+    if (value == 0.0) return;  // many terms are: those of axis-parallel rays, or of small integers
     std::size_t kept = 0;
     for (const double part : parts_) {
         // Knuth's TwoSum: sum + error is value + part exactly.

@@ -9,6 +9,10 @@
 
 namespace bvhlab {
 
+/// References of a tree at most: the numbers of its 2n - 1 nodes fit in 32 bits, and so do twice
+/// the numbers of the interior ones, which reinsertion uses.
+inline constexpr std::size_t most_references = std::size_t(1) << 31;
+
 /// The tree that every builder returns: binary, one reference per leaf.
 ///
 /// With n references there are 2n - 1 nodes: interior nodes 0 .. n-2, leaves n-1 .. 2n-2, root 0.

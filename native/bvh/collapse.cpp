@@ -15,13 +15,17 @@ namespace {
 
 /// The dynamic programme of Ylitie et al. 2017, section 3.1. For each binary node N and j = 1..k-1
 /// it finds the least cost C(N, j) of representing N's subtree by a forest of at most j wide trees.
-template <unsigned K>
+/// Leaves of more than `most_references` are not made.
+template <class Tree>
 class DynamicProgramme {
 public:
-    DynamicProgramme(const BinaryBvh& binary, const CostModel& model)
+    static constexpr unsigned K = Tree::branching;
+
+    DynamicProgramme(const BinaryBvh& binary, const CostModel& model, std::uint32_t most_references)
         : binary_(binary),
           traversal_(float(model.traversal)),
           intersection_(float(model.intersection)),
+          most_references_(most_references),
           plans_(binary.children.size()) {
         const double root_area = binary.boxes[0].half_area();
         scale_ = root_area > 0.0 ? 1.0 / root_area : 0.0;
@@ -44,10 +48,11 @@ public:
         // One tree: a leaf of all references, or a wide node over a forest of k. A tie makes a
         // leaf.
         const float relative_area = area(node);
-        const float as_leaf = relative_area * intersection_ * float(charged_tests(plan.size, K));
+        const float as_leaf = relative_area * intersection_ * float(Tree::charged(plan.size));
         const float as_node = relative_area * traversal_ + best[K];
-        plan.cost[1] = as_leaf <= as_node ? as_leaf : as_node;
-        plan.left_share[1] = as_leaf <= as_node ? Plan<K>::leaf : std::uint8_t(share[K]);
+        const bool leaf = as_leaf <= as_node && plan.size <= most_references_;
+        plan.cost[1] = leaf ? as_leaf : as_node;
+        plan.left_share[1] = leaf ? Plan<K>::leaf : std::uint8_t(share[K]);
         plan.node_share = std::uint8_t(share[K]);
 
         // At most j trees: j - 1 of them where more do not help.
@@ -104,33 +109,42 @@ private:
     Costs costs(std::uint32_t node) const {
         if (!binary_.is_leaf(node)) return plans_[node].cost;
         Costs costs;
-        costs.fill(area(node) * intersection_ * float(charged_tests(1, K)));
+        costs.fill(area(node) * intersection_ * float(Tree::charged(1)));
         return costs;
     }
 
     const BinaryBvh& binary_;
     float traversal_, intersection_;
+    std::uint32_t most_references_;
     double scale_;
     Array<Plan<K>> plans_;
 };
 
+template <class Tree>
+Array<Plan<Tree::branching>> plan(const BinaryBvh& binary, const CostModel& model,
+                                  std::uint32_t most_references, Token& token) {
+    constexpr std::size_t most = std::size_t(1) << 28;
+    if (binary.reference_count() > most)
+        throw std::length_error("the tree has more than 2^28 references");
+    token.begin("collapsing");
+    DynamicProgramme<Tree> programme(binary, model, most_references);
+    for_each_leaf_first(binary, token, [&](std::uint32_t node) { programme.plan(node); });
+    token.advance(0.5F);
+    return programme.take();
+}
+
 template <unsigned K>
 Bvh collapse_to(const BinaryBvh& binary, std::shared_ptr<const Mesh> mesh, const CostModel& model,
                 Token& token) {
-    token.begin("collapsing");
-    DynamicProgramme<K> programme(binary, model);
-    for_each_leaf_first(binary, token, [&](std::uint32_t node) { programme.plan(node); });
-    token.advance(0.5F);
-    return breadth_first_layout<K>(binary, programme.take(), std::move(mesh), token);
+    constexpr std::uint32_t any = std::numeric_limits<std::uint32_t>::max();
+    const auto plans = plan<WideBvh<K>>(binary, model, any, token);
+    return breadth_first_layout<K>(binary, plans, std::move(mesh), token);
 }
 
 }  // namespace
 
 Bvh collapse(const BinaryBvh& binary, std::shared_ptr<const Mesh> mesh, unsigned branching,
              const CostModel& model, Token& token) {
-    constexpr std::size_t most_references = std::size_t(1) << 28;
-    if (binary.reference_count() > most_references)
-        throw std::length_error("the tree has more than 2^28 references");
     switch (branching) {
         case 2:
             return collapse_to<2>(binary, std::move(mesh), model, token);
@@ -141,6 +155,12 @@ Bvh collapse(const BinaryBvh& binary, std::shared_ptr<const Mesh> mesh, unsigned
         default:
             throw std::invalid_argument("branching must be 2, 4 or 8");
     }
+}
+
+Bvh compress(const BinaryBvh& binary, std::shared_ptr<const Mesh> mesh, const CostModel& model,
+             Token& token) {
+    const auto plans = plan<CompressedBvh>(binary, model, CompressedNode::most_references, token);
+    return compressed_layout(binary, plans, std::move(mesh), token);
 }
 
 }  // namespace bvhlab

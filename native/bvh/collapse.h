@@ -16,4 +16,10 @@ namespace bvhlab {
 Bvh collapse(const BinaryBvh& binary, std::shared_ptr<const Mesh> mesh, unsigned branching,
              const CostModel& model, Token& token);
 
+/// The same for compressed 8-wide nodes (compressed_bvh.h): leaves have at most three references,
+/// and Eq. 3 charges each reference as one test. Costs are those of the boxes before they are
+/// quantised.
+Bvh compress(const BinaryBvh& binary, std::shared_ptr<const Mesh> mesh, const CostModel& model,
+             Token& token);
+
 }  // namespace bvhlab

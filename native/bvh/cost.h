@@ -21,7 +21,9 @@ inline std::size_t charged_tests(std::size_t size, unsigned branching) {
     return branching == 2 ? size : (size + branching - 1) / branching * branching;
 }
 
-/// Eq. 2 (k = 2) or Eq. 3 (k = 4, 8) of the whole tree, the root included, summed in double.
+/// Eq. 2 (k = 2) or Eq. 3 (k = 4, 8) of the whole tree, the root included, summed in double. In
+/// compressed nodes boxes count as they decode, and a leaf is charged its references as they are
+/// (Ylitie et al. 2017): no lane of it is unused.
 double cost(const Bvh& bvh, const CostModel& model);
 
 /// Eq. 2 of a tree with one reference per leaf, summed in double. The same for any thread count.

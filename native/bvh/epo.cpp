@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bvh/epo.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <atomic>
 #include <functional>
@@ -25,32 +22,32 @@ struct Homes {
 };
 
 /// Calls `visit(triangle, leaf)` for every reference of the tree.
-template <unsigned K, class Visit>
-void for_each_reference(const WideBvh<K>& wide, const Subtrees& below, const Token& token,
+template <class Tree, class Visit>
+void for_each_reference(const Tree& wide, const Subtrees& below, const Token& token,
                         Visit&& visit) {
-    constexpr unsigned lanes = WideBvh<K>::lanes;
+    constexpr unsigned k = Tree::branching;
     Array<std::uint32_t> first_leaf(wide.nodes.size());
     first_leaf[0] = 0;
     for (std::size_t node = 0; node < wide.nodes.size(); ++node) {
         if (node % 4096 == 0) token.check();
-        const WideNode<K>& parent = wide.nodes[node];
+        const WideNode<k>& parent = wide.node(node);
         std::uint32_t leaf = first_leaf[node];
-        for (unsigned i = 0; i < K && !parent.is_missing(i); ++i) {
+        for (unsigned i = 0; i < k && !parent.is_missing(i); ++i) {
             const std::uint32_t child = parent.child[i];
             if (!parent.is_leaf(i)) {
                 first_leaf[child] = leaf;
                 leaf += below.leaves[child];
                 continue;
             }
-            for (std::uint32_t lane = 0; lane < parent.count[i]; ++lane)
-                visit(wide.blocks[child + lane / lanes].triangle[lane % lanes], leaf);
+            for (std::uint32_t n = 0; n < parent.count[i]; ++n)
+                visit(wide.reference(child, n), leaf);
             ++leaf;
         }
     }
 }
 
-template <unsigned K>
-Homes find_homes(const WideBvh<K>& wide, const Subtrees& below, std::size_t triangles,
+template <class Tree>
+Homes find_homes(const Tree& wide, const Subtrees& below, std::size_t triangles,
                  const Token& token) {
     Homes homes{Array<std::uint32_t>(triangles + 1, 0), {}};
     for_each_reference(wide, below, token,
@@ -68,11 +65,11 @@ Homes find_homes(const WideBvh<K>& wide, const Subtrees& below, std::size_t tria
 }
 
 /// Takes one triangle after the other down the tree.
-template <unsigned K>
+template <class Tree>
 class Descent {
 public:
-    Descent(const WideBvh<K>& wide, const Subtrees& below, const Homes& homes,
-            const CostModel& model, const Token& token)
+    Descent(const Tree& wide, const Subtrees& below, const Homes& homes, const CostModel& model,
+            const Token& token)
         : wide_(wide), below_(below), homes_(homes), model_(model), token_(token) {}
 
     /// Sum over the nodes that the triangle is not in of C_n times twice its area in their boxes.
@@ -90,6 +87,8 @@ public:
     }
 
 private:
+    static constexpr unsigned k = Tree::branching;
+
     /// A node that the triangle reaches into. Its part inside the box is on top of `corners_`.
     struct Visit {
         std::uint32_t node, first_leaf;
@@ -113,10 +112,10 @@ private:
     }
 
     void visit(const Visit& at) {
-        const WideNode<K>& node = wide_.nodes[at.node];
+        const WideNode<k>& node = wide_.node(at.node);
         const Extent reach = extent(polygon_);
         std::uint32_t leaf = at.first_leaf, home = at.home;
-        for (unsigned i = 0; i < K && !node.is_missing(i); ++i) {
+        for (unsigned i = 0; i < k && !node.is_missing(i); ++i) {
             const std::uint32_t child = node.child[i];
             Visit next{child, leaf, home, home, at.area, {}};
             leaf += node.is_leaf(i) ? 1 : below_.leaves[child];
@@ -126,7 +125,7 @@ private:
         }
     }
 
-    void enter(const WideNode<K>& node, unsigned i, Visit& next, const Extent& reach) {
+    void enter(const WideNode<k>& node, unsigned i, Visit& next, const Extent& reach) {
         const bool is_in = next.home != next.home_end;
         if (is_in && node.is_leaf(i)) return;
         const Polygon* part = &polygon_;
@@ -141,11 +140,11 @@ private:
             sum_ += below_.work[next.node] * next.area;
             return;
         }
-        if (!is_in) sum_ += node_work(node, i, model_) * next.area;
+        if (!is_in) sum_ += node_work<Tree>(node, i, model_) * next.area;
         if (!node.is_leaf(i)) push(next, *part);
     }
 
-    const WideBvh<K>& wide_;
+    const Tree& wide_;
     const Subtrees& below_;
     const Homes& homes_;
     const CostModel& model_;
@@ -157,8 +156,8 @@ private:
     Polygon polygon_, clipped_, spare_;  // polygon_: the part in the node being visited
 };
 
-template <unsigned K>
-double overlap_of(const Mesh& mesh, const WideBvh<K>& wide, const CostModel& model, Token& token) {
+template <class Tree>
+double overlap_of(const Mesh& mesh, const Tree& wide, const CostModel& model, Token& token) {
     const Subtrees below = find_subtrees(wide, model, token);
     const Homes homes = find_homes(wide, below, mesh.size(), token);
 
@@ -170,9 +169,9 @@ double overlap_of(const Mesh& mesh, const WideBvh<K>& wide, const CostModel& mod
         }
     };
     std::atomic<std::size_t> done = 0;
-    const auto add = [&](const tbb::blocked_range<std::size_t>& triangles, Sums sums) {
+    const auto add = [&](const IndexRange& triangles, Sums sums) {
         token.check();
-        Descent<K> descent(wide, below, homes, model, token);
+        Descent<Tree> descent(wide, below, homes, model, token);
         Polygon corners;
         for (std::size_t triangle = triangles.begin(); triangle < triangles.end(); ++triangle) {
             set_polygon(corners, mesh.triangle(triangle));
@@ -183,8 +182,7 @@ double overlap_of(const Mesh& mesh, const WideBvh<K>& wide, const CostModel& mod
         return sums;
     };
     constexpr std::size_t grain = 256;
-    const Sums sums = tbb::parallel_deterministic_reduce(
-        tbb::blocked_range<std::size_t>(0, mesh.size(), grain), Sums{}, add, std::plus<>());
+    const Sums sums = parallel_sum(0, mesh.size(), grain, Sums{}, add);
     return sums.area > 0.0 ? sums.overlap / sums.area : 0.0;
 }
 

@@ -31,4 +31,9 @@ template <unsigned K>
 Bvh breadth_first_layout(const BinaryBvh& binary, const Array<Plan<K>>& plans,
                          std::shared_ptr<const Mesh> mesh, Token& token);
 
+/// The same as compressed nodes, siblings in order of their slots. No leaf may have more than
+/// CompressedNode::most_references references.
+Bvh compressed_layout(const BinaryBvh& binary, const Array<Plan<8>>& plans,
+                      std::shared_ptr<const Mesh> mesh, Token& token);
+
 }  // namespace bvhlab

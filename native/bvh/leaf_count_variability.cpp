@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bvh/leaf_count_variability.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/partitioner.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -13,6 +9,7 @@
 #include <numbers>
 #include <vector>
 
+#include "base/parallel.h"
 #include "bvh/subtrees.h"
 
 namespace bvhlab {
@@ -95,16 +92,17 @@ Line random_line(const Box& box, std::uint64_t index) {
 }
 
 /// Leaves whose box the line meets. `pending` is working memory.
-template <unsigned K>
-std::uint32_t count_leaves(const WideBvh<K>& wide, const Subtrees& below, const Line& line,
+template <class Tree>
+std::uint32_t count_leaves(const Tree& wide, const Subtrees& below, const Line& line,
                            std::vector<std::uint32_t>& pending, const Token& token) {
+    constexpr unsigned k = Tree::branching;
     std::uint32_t count = 0, visits = 0;
     pending.assign(1, 0);
     while (!pending.empty()) {
         if (++visits % 4096 == 0) token.check();
-        const WideNode<K>& node = wide.nodes[pending.back()];
+        const WideNode<k>& node = wide.node(pending.back());
         pending.pop_back();
-        for (unsigned i = 0; i < K && !node.is_missing(i); ++i) {
+        for (unsigned i = 0; i < k && !node.is_missing(i); ++i) {
             if (!line.meets(node, i)) continue;
             const std::uint32_t child = node.child[i];
             if (node.is_leaf(i))
@@ -136,17 +134,19 @@ LeafCounts moments(const std::vector<std::uint32_t>& counts) {
     return {mean, std::sqrt(variance), std::sqrt(spread / n / variance) / 2.0};
 }
 
-template <unsigned K>
-LeafCounts variability_of(const WideBvh<K>& wide, std::size_t lines, Token& token) {
+template <class Tree>
+LeafCounts variability_of(const Tree& wide, std::size_t lines, Token& token) {
+    constexpr unsigned k = Tree::branching;
+    const WideNode<k>& root = wide.node(0);
     Box scene = Box::empty();
-    for (unsigned i = 0; i < K; ++i) scene.grow(wide.nodes[0].box(i));
+    for (unsigned i = 0; i < k; ++i) scene.grow(root.box(i));
     if (!(scene.half_area() > 0.0)) return {};
 
     const Subtrees below = find_subtrees(wide, CostModel{}, token);
     std::vector<std::uint32_t> counts(lines);
     std::atomic<std::size_t> done = 0;
     constexpr std::size_t grain = 64;
-    const auto count = [&](const tbb::blocked_range<std::size_t>& range) {
+    const auto count = [&](const IndexRange& range) {
         token.check();
         std::vector<std::uint32_t> pending;
         for (std::size_t i = range.begin(); i < range.end(); ++i)
@@ -154,8 +154,7 @@ LeafCounts variability_of(const WideBvh<K>& wide, std::size_t lines, Token& toke
         token.advance(float(done += range.size()) / float(lines));
     };
     // Not more than `grain` lines to a task, so that a cancel is seen soon.
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, lines, grain), count,
-                      tbb::simple_partitioner());
+    parallel_for_ranges(0, lines, grain, count);
     return moments(counts);
 }
 

@@ -8,15 +8,16 @@
 namespace bvhlab {
 namespace {
 
-template <unsigned K>
-Shape shape_of(const WideBvh<K>& wide) {
+template <class Tree>
+Shape shape_of(const Tree& wide) {
+    constexpr unsigned k = Tree::branching;
     Shape shape;
     std::vector<std::size_t> depth(wide.nodes.size(), 0);
     depth[0] = 1;
     std::size_t leaves = 0, depths = 0;
     for (std::size_t node = 0; node < wide.nodes.size(); ++node) {  // parents come first
-        const WideNode<K>& parent = wide.nodes[node];
-        for (unsigned i = 0; i < K && !parent.is_missing(i); ++i) {
+        const WideNode<k>& parent = wide.node(node);
+        for (unsigned i = 0; i < k && !parent.is_missing(i); ++i) {
             if (!parent.is_leaf(i)) {
                 depth[parent.child[i]] = depth[node] + 1;
                 continue;

@@ -22,14 +22,15 @@ struct Subtrees {
 };
 
 /// C_n, the cost of one visit: c_T for an interior node, c_I times the tests charged for a leaf.
-template <unsigned K>
-double node_work(const WideNode<K>& parent, unsigned child, const CostModel& model) {
+template <class Tree>
+double node_work(const WideNode<Tree::branching>& parent, unsigned child, const CostModel& model) {
     if (!parent.is_leaf(child)) return model.traversal;
-    return model.intersection * double(charged_tests(parent.count[child], K));
+    return model.intersection * double(Tree::charged(parent.count[child]));
 }
 
-template <unsigned K>
-Subtrees find_subtrees(const WideBvh<K>& wide, const CostModel& model, const Token& token) {
+template <class Tree>
+Subtrees find_subtrees(const Tree& wide, const CostModel& model, const Token& token) {
+    constexpr unsigned k = Tree::branching;
     const std::size_t nodes = wide.nodes.size();
     Subtrees below{Array<std::uint32_t>(nodes), Array<double>(nodes), Array<Box>(nodes)};
     constexpr float infinity = std::numeric_limits<float>::infinity();
@@ -38,12 +39,12 @@ Subtrees find_subtrees(const WideBvh<K>& wide, const CostModel& model, const Tok
         std::uint32_t leaves = 0;
         double work = model.traversal;
         Box common{glm::vec3(-infinity), glm::vec3(infinity)};
-        const WideNode<K>& parent = wide.nodes[node];
-        for (unsigned i = 0; i < K && !parent.is_missing(i); ++i) {
+        const WideNode<k>& parent = wide.node(node);
+        for (unsigned i = 0; i < k && !parent.is_missing(i); ++i) {
             const bool leaf = parent.is_leaf(i);
             const std::uint32_t child = parent.child[i];
             leaves += leaf ? 1 : below.leaves[child];
-            work += leaf ? node_work(parent, i, model) : below.work[child];
+            work += leaf ? node_work<Tree>(parent, i, model) : below.work[child];
             common = intersect(common, leaf ? parent.box(i) : below.common[child]);
         }
         below.leaves[node] = leaves;

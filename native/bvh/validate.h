@@ -10,6 +10,10 @@ namespace bvhlab {
 /// node, each triangle is referenced, boxes are free of NaN and contain what is below them, leaf
 /// block ranges are disjoint and complete, and counts and depth are those stored.
 ///
+/// A compressed tree's masks and metadata must be those of what is stored, unused slots must be
+/// marked as such, and the boxes are taken as they decode; its nodes need not contain the boxes
+/// below them, but the common part of all boxes down to a leaf counts as the leaf's.
+///
 /// Boxes of split references need not contain their triangle: then every corner of the triangle
 /// must lie in one of its references' boxes. Throws std::logic_error with the first broken
 /// invariant.

@@ -1,43 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <variant>
 
 #include "base/array.h"
+#include "bvh/compressed_bvh.h"
+#include "bvh/cost.h"
+#include "bvh/transform_cache.h"
+#include "bvh/wide_node.h"
 #include "scene/mesh.h"
 
 namespace bvhlab {
-
-/// Interior node of a k-ary tree, 32k bytes (paper section 3): the boxes of its children, one plane
-/// of all children after the other so that SIMD lanes are children, and where each child is.
-///
-/// Children come first, missing ones last: an empty box (lower = +inf, upper = -inf), which no ray
-/// enters, index 0 and count 0.
-template <unsigned K>
-struct alignas(32) WideNode {
-    float planes[6][K];      ///< lower x, upper x, lower y, upper y, lower z, upper z
-    std::uint32_t child[K];  ///< interior child: node index; leaf: its first triangle block
-    std::uint32_t count[K];  ///< interior child: 0; leaf: number of references
-
-    bool is_missing(unsigned i) const { return planes[0][i] > planes[1][i]; }
-    bool is_leaf(unsigned i) const { return count[i] != 0; }
-
-    Box box(unsigned i) const {
-        return {{planes[0][i], planes[2][i], planes[4][i]},
-                {planes[1][i], planes[3][i], planes[5][i]}};
-    }
-    void set_box(unsigned i, const Box& box) {
-        for (int axis = 0; axis < 3; ++axis) {
-            planes[2 * axis][i] = box.lower[axis];
-            planes[2 * axis + 1][i] = box.upper[axis];
-        }
-    }
-};
-static_assert(sizeof(WideNode<2>) == 64 && sizeof(WideNode<4>) == 128 &&
-              sizeof(WideNode<8>) == 256);
 
 /// Lanes of a triangle block: leaves of wide trees are filled in multiples of k (Eq. 3); binary
 /// trees take four, the narrowest SIMD width.
@@ -60,31 +37,53 @@ struct WideBvh {
 
     Array<WideNode<K>> nodes;
     Array<TriangleBlock<lanes>> blocks;
+
+    /// Tests charged for a leaf of `size` references.
+    static std::size_t charged(std::size_t size) { return charged_tests(size, K); }
+
+    std::size_t node_bytes() const { return nodes.size() * sizeof(nodes[0]); }
+    std::size_t leaf_bytes() const { return blocks.size() * sizeof(blocks[0]); }
+
+    // What CompressedBvh has too, for whatever measures trees.
+    const WideNode<K>& node(std::size_t index) const { return nodes[index]; }
+    /// Triangle of reference i of the leaf whose child is `leaf`.
+    std::uint32_t reference(std::uint32_t leaf, std::uint32_t i) const {
+        return blocks[leaf + i / lanes].triangle[i % lanes];
+    }
 };
+
+/// How nodes are stored.
+enum class NodeLayout { full, cwbvh };
+inline constexpr std::array<const char*, 2> node_layout_names = {"full", "cwbvh"};
 
 /// The tree that rays traverse. The root is always an interior node, so a single leaf is its one
 /// child.
 struct Bvh {
     std::shared_ptr<const Mesh> mesh;
-    std::variant<WideBvh<2>, WideBvh<4>, WideBvh<8>> tree;
+    std::variant<WideBvh<2>, WideBvh<4>, WideBvh<8>, CompressedBvh> tree;
 
     std::size_t reference_count = 0;
     std::size_t leaf_count = 0;
     std::size_t max_leaf_size = 0;
     std::size_t max_depth = 0;  ///< interior nodes on the longest way from root to leaf
 
+    /// Shared by copies: whoever changes `tree` takes a new one.
+    std::shared_ptr<TransformCache> transforms = std::make_shared<TransformCache>();
+
     unsigned branching() const {
         return std::visit([](const auto& wide) { return wide.branching; }, tree);
+    }
+    NodeLayout layout() const {
+        return std::holds_alternative<CompressedBvh>(tree) ? NodeLayout::cwbvh : NodeLayout::full;
     }
     std::size_t interior_count() const {
         return std::visit([](const auto& wide) { return wide.nodes.size(); }, tree);
     }
     std::size_t node_bytes() const {
-        return std::visit([](const auto& w) { return w.nodes.size() * sizeof(w.nodes[0]); }, tree);
+        return std::visit([](const auto& wide) { return wide.node_bytes(); }, tree);
     }
     std::size_t leaf_bytes() const {
-        return std::visit([](const auto& w) { return w.blocks.size() * sizeof(w.blocks[0]); },
-                          tree);
+        return std::visit([](const auto& wide) { return wide.leaf_bytes(); }, tree);
     }
 };
 

@@ -2,6 +2,7 @@
 // builders, build_tree, Tree, build, Bvh.
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "base/parallel.h"
@@ -46,6 +47,18 @@ void check_branching(unsigned branching) {
         throw py::value_error("branching must be 2, 4 or 8, not " + std::to_string(branching));
 }
 
+NodeLayout layout_from_python(const std::string& layout, unsigned branching) {
+    check_branching(branching);
+    const auto found = std::ranges::find(node_layout_names, layout);
+    if (found == node_layout_names.end())
+        throw py::value_error("unknown layout '" + layout + "'; there are full and cwbvh");
+    const auto chosen = NodeLayout(found - node_layout_names.begin());
+    if (chosen == NodeLayout::cwbvh && branching != CompressedBvh::branching)
+        throw py::value_error("layout cwbvh has branching 8 only, not " +
+                              std::to_string(branching));
+    return chosen;
+}
+
 // --- calls ---------------------------------------------------------------------------------------
 
 std::shared_ptr<PyTree> build_tree(const std::shared_ptr<Mesh>& mesh, const std::string& builder_id,
@@ -75,8 +88,9 @@ std::shared_ptr<PyTree> build_tree(const std::shared_ptr<Mesh>& mesh, const std:
 }
 
 std::shared_ptr<PyBvh> collapse_tree(const PyTree& tree, unsigned branching,
+                                     const std::string& layout_name,
                                      const std::shared_ptr<Token>& given_token) {
-    check_branching(branching);
+    const NodeLayout layout = layout_from_python(layout_name, branching);
     const auto token = token_or_new(given_token);
 
     const py::gil_scoped_release release;
@@ -87,7 +101,9 @@ std::shared_ptr<PyBvh> collapse_tree(const PyTree& tree, unsigned branching,
     result->log = tree.log;
     with_threads(tree.threads, [&] {
         const Stopwatch watch;
-        result->bvh = collapse(tree.binary, tree.mesh, branching, tree.model, *token);
+        result->bvh = layout == NodeLayout::cwbvh
+                          ? compress(tree.binary, tree.mesh, tree.model, *token)
+                          : collapse(tree.binary, tree.mesh, branching, tree.model, *token);
         result->collapse_seconds = watch.seconds();
     });
     return result;
@@ -96,13 +112,13 @@ std::shared_ptr<PyBvh> collapse_tree(const PyTree& tree, unsigned branching,
 std::shared_ptr<PyBvh> build(const std::shared_ptr<Mesh>& mesh, const std::string& builder,
                              unsigned branching, const std::string& device, int threads,
                              const py::dict& params, double traversal, double intersection,
-                             const std::shared_ptr<Token>& given_token) {
+                             const std::string& layout, const std::shared_ptr<Token>& given_token) {
     find_builder(builder);
-    check_branching(branching);
+    layout_from_python(layout, branching);
     const auto token = token_or_new(given_token);
     const auto tree =
         build_tree(mesh, builder, device, threads, params, traversal, intersection, token);
-    return collapse_tree(*tree, branching, token);
+    return collapse_tree(*tree, branching, layout, token);
 }
 
 py::dict log_to_python(const BuildLog& log) {
@@ -120,6 +136,7 @@ py::dict stats(const PyBvh& self) {
     py::dict stats;
     stats["builder"] = self.builder;
     stats["branching"] = bvh.branching();
+    stats["layout"] = node_layout_names[std::size_t(bvh.layout())];
     stats["nodes"] = bvh.interior_count() + bvh.leaf_count;
     stats["interior_nodes"] = bvh.interior_count();
     stats["leaves"] = bvh.leaf_count;
@@ -170,8 +187,10 @@ py::list list_builders() {
 void bind_tree(py::module_& module) {
     py::class_<PyTree, std::shared_ptr<PyTree>>(
         module, "Tree", "A builder's binary tree with one reference per leaf.")
-        .def("collapse", &collapse_tree, py::arg("branching") = 8, py::arg("token") = nullptr,
-             "A Bvh of branching factor 2, 4 or 8, as core.build would give it.")
+        .def("collapse", &collapse_tree, py::arg("branching") = 8, py::arg("layout") = "full",
+             py::arg("token") = nullptr,
+             "A Bvh of branching factor 2, 4 or 8 in layout \"full\", or 8 in layout \"cwbvh\", as "
+             "core.build would give it.")
         .def(
             "cost", [](const PyTree& self) { return cost(self.binary, self.model); },
             "Eq. 2 before any collapse, one reference per leaf, with the costs it was built for.")
@@ -194,10 +213,16 @@ void bind_bvh(py::module_& module) {
                 return cost(self.bvh, {traversal, intersection});
             },
             py::arg("traversal") = 3.0, py::arg("intersection") = 2.0,
-            "Expected cost of a ray: Eq. 2 of the paper (branching 2) or Eq. 3 (4 and 8).")
+            "Expected cost of a ray, Eq. 2 of the paper (branching 2) or Eq. 3 (4 and 8), of the "
+            "boxes as stored. Eq. 3 charges the tests of a leaf rounded up to a multiple of the "
+            "branching factor, as its triangles fill SIMD lanes. In layout cwbvh each triangle is "
+            "charged by itself, as by Ylitie et al. 2017, and boxes count as they decode: costs of "
+            "different layouts are not comparable.")
         .def_property_readonly("stats", &stats,
                                "Sizes, counts and build times in seconds; for builders that work "
-                               "in iterations how many, and why they `ended`.")
+                               "in iterations how many, and why they `ended`. `node_bytes` are "
+                               "those of interior nodes, `leaf_bytes` those of triangles as leaves "
+                               "hold them, unused SIMD lanes included; `bytes` is the sum.")
         .def_property_readonly(
             "log", [](const PyBvh& self) { return log_to_python(self.log); },
             "The binary tree's log, as Tree.log.")
@@ -215,7 +240,11 @@ void bind_bvh(py::module_& module) {
         .def_property_readonly(
             "mesh", [](const PyBvh& self) { return std::const_pointer_cast<Mesh>(self.bvh.mesh); })
         .def_property_readonly("builder", [](const PyBvh& self) { return self.builder; })
-        .def_property_readonly("branching", [](const PyBvh& self) { return self.bvh.branching(); });
+        .def_property_readonly("branching", [](const PyBvh& self) { return self.bvh.branching(); })
+        .def_property_readonly(
+            "layout",
+            [](const PyBvh& self) { return node_layout_names[std::size_t(self.bvh.layout())]; },
+            "How nodes are stored: \"full\" or \"cwbvh\".");
 }
 
 }  // namespace
@@ -237,9 +266,12 @@ void bind_build(py::module_& module) {
     module.def(
         "build", &build, py::arg("mesh"), py::arg("builder"), py::arg("branching") = 8,
         py::arg("device") = "cpu", py::arg("threads") = 0, py::arg("params") = py::dict(),
-        py::arg("traversal") = 3.0, py::arg("intersection") = 2.0, py::arg("token") = nullptr,
-        "Builds a tree. Raises ValueError for unknown names and values out of range, Cancelled "
-        "after token.cancel().");
+        py::arg("traversal") = 3.0, py::arg("intersection") = 2.0, py::arg("layout") = "full",
+        py::arg("token") = nullptr,
+        "Builds a tree. `layout` is \"full\" (floats, 32 bytes a child) or, for branching 8, "
+        "\"cwbvh\" (80-byte nodes of Ylitie, Karras, Laine 2017: boxes quantised outward, at most "
+        "three triangles to a leaf); hits are the same. Raises ValueError for unknown names and "
+        "values out of range, Cancelled after token.cancel().");
 }
 
 }  // namespace bvhlab

@@ -5,6 +5,7 @@
 #include "base/parallel.h"
 #include "python/convert.h"
 #include "trace/trace.h"
+#include "trace/transforms.h"
 
 namespace bvhlab {
 namespace {
@@ -18,16 +19,17 @@ Array<glm::uvec3> triangle_rows(const py::handle& argument) {
     if (kind != 'i' && kind != 'u') throw py::value_error("triangles must be an array of integers");
     if (array.ndim() != 2 || array.shape(1) != 3)
         throw py::value_error("triangles must have shape (T, 3)");
+    check_triangle_count(std::size_t(array.shape(0)));  // before any copy
     using Indices = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
     using Unsigned = py::array_t<std::uint32_t, py::array::c_style>;
     Array<glm::uvec3> triangles(std::size_t(array.shape(0)));
     auto* out = reinterpret_cast<std::uint32_t*>(triangles.data());
     if (Unsigned::check_(array)) {
-        const auto exact = Unsigned::ensure(array);
+        const auto exact = converted<Unsigned>(array);
         std::copy_n(exact.data(), exact.size(), out);
         return triangles;
     }
-    const auto wide = Indices::ensure(array);
+    const auto wide = converted<Indices>(array);
     for (py::ssize_t i = 0; i < wide.size(); ++i) {
         if (wide.data()[i] < 0 || wide.data()[i] > 0xFFFFFFFFLL)
             throw py::value_error("triangle " + std::to_string(i / 3) + " refers to vertex " +
@@ -51,11 +53,14 @@ std::shared_ptr<Mesh> mesh_from_python(const py::handle& vertices, const py::han
 PyHits trace_rays(const PyBvh& self, const py::object& origins, const py::object& directions,
                   const py::object& t_min, const py::object& t_max, bool any_hit,
                   const py::object& reorder, const std::string& device, int threads, bool count,
-                  const std::shared_ptr<Token>& given_token) {
+                  const std::shared_ptr<Token>& given_token, const std::string& triangle_test,
+                  const std::string& box_test) {
     check_device(device);
     check_threads(threads);
     const RayArguments rays(origins, directions, t_min, t_max);
-    const TraceOptions options{any_hit, reorder_from_python(reorder), count, threads};
+    const TraceOptions options{
+        any_hit, reorder_from_python(reorder),       count,
+        threads, triangle_test_named(triangle_test), box_test_named(box_test)};
     const auto token = token_or_new(given_token);
     Hits hits;
     {
@@ -63,6 +68,51 @@ PyHits trace_rays(const PyBvh& self, const py::object& origins, const py::object
         hits = trace(self.bvh, rays.batch(), options, *token);
     }
     return to_python(std::move(hits), any_hit, count);
+}
+
+py::dict precision(const char* id, const char* label, const char* source, const char* bytes_key,
+                   std::size_t bytes) {
+    py::dict choice;
+    choice["id"] = id;
+    choice["label"] = label;
+    choice["source"] = source;
+    if (bytes) choice[bytes_key] = bytes;
+    return choice;
+}
+
+py::dict precisions() {
+    const auto triangle_test = [](TriangleTest test, const char* label, const char* source) {
+        const std::size_t floats = transform_floats(test);
+        return precision(triangle_test_names[std::size_t(test)], label, source,
+                         "bytes_per_triangle", (floats ? floats : 9) * sizeof(float));
+    };
+    const auto box_test = [](BoxTest test, const char* label, const char* source) {
+        return precision(box_test_names[std::size_t(test)], label, source, "", 0);
+    };
+    const auto layout = [](NodeLayout id, const char* label, const char* source,
+                           std::size_t bytes) {
+        return precision(node_layout_names[std::size_t(id)], label, source, "node_bytes", bytes);
+    };
+    py::list triangle_tests, box_tests, layouts;
+    triangle_tests.append(triangle_test(TriangleTest::watertight, "Watertight, exact",
+                                        "Woop, Benthin, Wald 2013, decided exactly"));
+    triangle_tests.append(
+        triangle_test(TriangleTest::moller_trumbore, "Möller–Trumbore", "Möller, Trumbore 1997"));
+    triangle_tests.append(
+        triangle_test(TriangleTest::woop_affine, "Woop affine", "Woop 2004; Aila, Laine 2009"));
+    triangle_tests.append(
+        triangle_test(TriangleTest::baldwin_weber, "Baldwin–Weber", "Baldwin, Weber 2016"));
+    box_tests.append(box_test(BoxTest::conservative, "Conservative", "Ize 2013"));
+    box_tests.append(box_test(BoxTest::plain, "Plain slabs", "Kay, Kajiya 1986"));
+    layouts.append(layout(NodeLayout::full, "Full float", "Meister, Bittner 2022, section 3",
+                          sizeof(WideNode<8>)));
+    layouts.append(layout(NodeLayout::cwbvh, "Compressed 8-wide", "Ylitie, Karras, Laine 2017",
+                          sizeof(CompressedNode)));
+    py::dict all;
+    all["triangle_test"] = triangle_tests;
+    all["box_test"] = box_tests;
+    all["layout"] = layouts;
+    return all;
 }
 
 py::list list_devices() {
@@ -167,6 +217,11 @@ void bind_hits(py::module_& module) {
         .def_readonly("key_seconds", &PyHits::key_seconds)
         .def_readonly("sort_seconds", &PyHits::sort_seconds)
         .def_readonly("traverse_seconds", &PyHits::traverse_seconds)
+        .def_readonly("prepare_seconds", &PyHits::prepare_seconds,
+                      "Making the triangles ready for a test with a transform: once for a tree and "
+                      "test, in no other time.")
+        .def_readonly("prepared_bytes", &PyHits::prepared_bytes,
+                      "Bytes of those transforms, beside the tree's own.")
         .def_property_readonly("seconds", [](const PyHits& hits) {
             return hits.key_seconds + hits.sort_seconds + hits.traverse_seconds;
         });
@@ -183,10 +238,19 @@ void bind_core(py::module_& module) {
         py::arg("t_min") = 0.0F, py::arg("t_max") = std::numeric_limits<float>::infinity(),
         py::arg("any_hit") = false, py::arg("reorder") = false, py::arg("device") = "cpu",
         py::arg("threads") = 0, py::arg("count") = false, py::arg("token") = nullptr,
+        py::arg("triangle_test") = triangle_test_names[0], py::arg("box_test") = box_test_names[0],
         "Traces rays (N, 3) float32. `reorder` sorts them first: False or \"off\", True or "
         "\"aila\", \"origin\", \"octahedron\", \"two_point\"; hits come in the order given and "
         "are the same. `count` fills node_visits, box_tests and triangle_tests, (N,) uint32. "
-        "Raises ValueError naming the first bad ray.");
+        "`triangle_test` and `box_test` are ids of precisions(): with the default ones hits are "
+        "exact and the same from every tree; the others are there to compare speed and error "
+        "with. Raises ValueError naming the first bad ray, or the ids there are.");
+    module.def(
+        "precisions", &precisions,
+        "What can be chosen between speed and error: \"triangle_test\" and \"box_test\" of "
+        "trace(), \"layout\" of build(). Each a list of {\"id\", \"label\", \"source\"}, the "
+        "default first; triangle tests with \"bytes_per_triangle\", what they read of one, "
+        "layouts with \"node_bytes\", an 8-wide node's.");
     module.def("devices", &list_devices,
                "The devices there are; `reason` says why one is left out.");
     module.def("features", &features, "What this build of the core holds.");

@@ -107,7 +107,7 @@ Crossing crossing(const Ray& ray, const Triangle& triangle) {
     add_determinant(result.determinant, ray.direction, b, c);
     add_determinant(result.determinant, ray.direction, c, a);
     add_determinant(result.determinant, ray.direction, a, b);
-    result.t = result.numerator.value() / result.determinant.value();
+    result.t = result.numerator.value() / result.determinant.value() + 0.0;  // no -0
     return result;
 }
 
@@ -133,8 +133,8 @@ HitOf<double> make_hit(const Ray& ray, const Triangle& triangle, std::uint32_t i
         return exact_volume(ray.origin, ray.direction, p, q).value();
     };
     const double determinant = crossing.determinant.value();
-    return {crossing.t, volume_of(triangle.c, triangle.a) / determinant,
-            volume_of(triangle.a, triangle.b) / determinant, index};
+    return {crossing.t, volume_of(triangle.c, triangle.a) / determinant + 0.0,
+            volume_of(triangle.a, triangle.b) / determinant + 0.0, index};
 }
 
 }  // namespace bvhlab

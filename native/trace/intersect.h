@@ -6,11 +6,18 @@
 #include <cmath>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <limits>
 
 #include "scene/mesh.h"
 #include "trace/ray.h"
 
 namespace bvhlab {
+
+/// What a slab test subtracts from a box's planes and multiplies with.
+struct Slabs {
+    const glm::vec3 &near_origin, &far_origin;
+    const glm::vec3 &near_inverse, &far_inverse;
+};
 
 /// How boxes and triangles are intersected, and why a hit depends on mesh and ray alone.
 ///
@@ -27,6 +34,11 @@ namespace bvhlab {
 /// interval contains the exact one, with slack to spare for the rounding of the hit's own distance.
 /// Rounding is monotone, so a larger box has a computed interval that contains the smaller one's.
 ///
+/// Whether t_min <= t <= t_max is decided exactly, too, and t is within 1.5 units in the last place
+/// of float: double arithmetic comes with a bound on its error (meets_triangle), and where that
+/// does not do, t is the quotient of two numbers held without rounding. Two triangles whose t round
+/// to the same float count as equally near, and the lower index is the answer.
+///
 /// The hit's distance is clamped to the computed interval of its triangle's *own box*, and a
 /// triangle whose own box is missed is not hit. By monotony the ray then enters every box that
 /// contains the triangle, at a distance not beyond the hit's: no tree can miss or cull it, and
@@ -36,24 +48,36 @@ namespace bvhlab {
 ///
 /// For boxes and distances, directions are scaled by a power of two so that the longest component
 /// is in [1, 2); t is scaled with them. That keeps very long and very short directions away from
-/// overflow. Components 2^-126 of the longest and less may lose bits or vanish there; the exact
-/// decision is taken on the direction as given.
-struct PreparedRay {
+/// overflow. In a scene smaller than 2^-100 the longest component is in [2^-60, 2^-59) instead, so
+/// that t is no denormal number. Small components may lose bits or vanish there; the exact decision
+/// is taken on the direction as given.
+struct BoxRay {
     glm::vec3 origin;
     glm::vec3 given_direction;
     glm::vec3 direction;  ///< scaled
-    float t_min, t_max;   ///< scaled
+    float t_min, t_max;   ///< scaled, rounded outward
     double unscale;       ///< the caller's t = scaled t * unscale
+    float reach;          ///< nothing of the scene is farther from the origin, along any axis
     int near_plane[3];    ///< row of WideNode::planes that the ray meets first, by axis
     int far_plane[3];
     glm::vec3 near_origin, far_origin;
     glm::vec3 near_inverse, far_inverse;
+
+    /// `bounds` is the mesh's box: the same for all trees.
+    BoxRay(const Ray& ray, const Box& bounds);
+
+    Slabs slabs() const { return {near_origin, far_origin, near_inverse, far_inverse}; }
+};
+
+/// A ray as the default tests need it.
+struct PreparedRay : BoxRay {
     int kx, ky, kz;          ///< kz: axis of the longest direction component
     float shear_x, shear_y;  ///< for the float filter
     float projection_error;  ///< bound on the float error of a projected coordinate
     double shear_xd, shear_yd, shear_zd;
+    float given_t_min, given_t_max;
+    double t_first, t_last;  ///< t_min and t_max scaled, exact
 
-    /// `bounds` is the mesh's box: the same for all trees.
     PreparedRay(const Ray& ray, const Box& bounds);
 };
 
@@ -67,30 +91,32 @@ inline int exponent_of(double value) {
     return int(std::bit_cast<std::uint64_t>(value) >> 52) - 1023;
 }
 
-inline PreparedRay::PreparedRay(const Ray& ray, const Box& bounds)
+inline BoxRay::BoxRay(const Ray& ray, const Box& bounds)
     : origin(ray.origin), given_direction(ray.direction) {
     constexpr float u = 0x1p-24F;
 
-    // Scale by a power of two.
-    const glm::vec3 size = glm::abs(ray.direction);
-    const float longest = std::max(size.x, std::max(size.y, size.z));
-    const int exponent = exponent_of(double(longest));
-    const double scale = power_of_two(exponent);
-    unscale = power_of_two(-exponent);
-    for (int axis = 0; axis < 3; ++axis)
-        direction[axis] = float(double(ray.direction[axis]) * unscale);
-    t_min = float(double(ray.t_min) * scale);
-    t_max = float(double(ray.t_max) * scale);
-
-    // Nothing of the scene is farther than `reach` from the origin, along any axis.
-    float reach = 0.0F;
+    reach = 0.0F;
     for (int axis = 0; axis < 3; ++axis)
         reach = std::max({reach, std::abs(bounds.lower[axis] - origin[axis]),
                           std::abs(bounds.upper[axis] - origin[axis])});
 
+    // Scale by a power of two.
+    const glm::vec3 size = glm::abs(ray.direction);
+    const float longest = std::max(size.x, std::max(size.y, size.z));
+    const int exponent = exponent_of(double(longest)) + (reach < 0x1p-100F ? 60 : 0);
+    const double scale = power_of_two(exponent);
+    unscale = power_of_two(-exponent);
+    for (int axis = 0; axis < 3; ++axis)
+        direction[axis] = float(double(ray.direction[axis]) * unscale);
+    constexpr float infinity = std::numeric_limits<float>::infinity();
+    t_min = float(double(ray.t_min) * scale);
+    if (double(t_min) > double(ray.t_min) * scale) t_min = std::nextafter(t_min, 0.0F);
+    t_max = float(double(ray.t_max) * scale);
+    if (double(t_max) < double(ray.t_max) * scale) t_max = std::nextafter(t_max, infinity);
+
     // Slabs. A component too small to invert is taken as parallel: it moves the ray by less than
-    // 2^-90 of the scene's size. The origin is then moved inward by `nudge` so that a ray in the
-    // plane of a face counts as inside, without 0 * infinity.
+    // 2^-39 of the scene's size. The origin is then moved inward by `nudge`, far more than that, so
+    // that a ray in the plane of a face counts as inside, without 0 * infinity.
     constexpr float parallel = 0x1p-100F;
     constexpr float huge = 0x1p126F;
     for (int axis = 0; axis < 3; ++axis) {
@@ -111,7 +137,9 @@ inline PreparedRay::PreparedRay(const Ray& ray, const Box& bounds)
             far_inverse[axis] = inverse * (1.0F + 8.0F * u);
         }
     }
+}
 
+inline PreparedRay::PreparedRay(const Ray& ray, const Box& bounds) : BoxRay(ray, bounds) {
     // Shear along the longest axis.
     const glm::vec3 magnitude = glm::abs(direction);
     kz = magnitude.x >= magnitude.y ? (magnitude.x >= magnitude.z ? 0 : 2)
@@ -123,7 +151,11 @@ inline PreparedRay::PreparedRay(const Ray& ray, const Box& bounds)
     shear_yd = double(given_direction[ky]) / double(given_direction[kz]);
     shear_x = float(shear_xd);
     shear_y = float(shear_yd);
-    projection_error = 8.0F * u * reach;
+    projection_error = 8.0F * 0x1p-24F * reach;
+    given_t_min = ray.t_min;
+    given_t_max = ray.t_max;
+    t_first = double(ray.t_min) / unscale;
+    t_last = double(ray.t_max) / unscale;
 }
 
 /// The edge function of the edge between two corners without rounding errors, for the rare case
@@ -131,10 +163,19 @@ inline PreparedRay::PreparedRay(const Ray& ray, const Box& bounds)
 /// given_direction.
 double exact_edge_function(const PreparedRay& ray, const float (&from)[3], const float (&to)[3]);
 
+/// Where a line crosses the plane of a triangle, as meets_triangle() computes it in double.
+struct PlaneCrossing {
+    double t, u, v;  ///< t scaled
+};
+
+/// The crossing without rounding errors but for those of a quotient each, for a line that meets the
+/// triangle; false where t, exactly, is not in the ray's interval.
+bool exact_plane_crossing(const PreparedRay& ray, const float (&corners)[3][3],
+                          PlaneCrossing& crossing);
+
 /// Computed interval [near, far] in which the ray is inside a box; `planes` by row of
 /// WideNode::planes.
-inline void box_interval(const PreparedRay& ray, const float (&planes)[6], float& near,
-                         float& far) {
+inline void box_interval(const BoxRay& ray, const float (&planes)[6], float& near, float& far) {
     near = ray.t_min;
     far = ray.t_max;
     for (int axis = 0; axis < 3; ++axis) {
@@ -147,10 +188,12 @@ inline void box_interval(const PreparedRay& ray, const float (&planes)[6], float
 
 /// Edge functions of a triangle: twice the signed areas that the ray spans with each edge once all
 /// is sheared so that it runs along the z axis; weights of the corners a, b, c up to a common
-/// factor. Signs are exact, values are within some 2^-50 of the largest.
+/// factor. Signs are exact.
 struct EdgeFunctions {
     double a, b, c;
-    double z[3];  ///< depths of the corners
+    double z[3];      ///< depths of the corners
+    double bound;     ///< on the error of a, b and c
+    double farthest;  ///< no corner is farther from the origin along any axis
 };
 
 inline EdgeFunctions edge_functions(const PreparedRay& ray, const float (&corners)[3][3]) {
@@ -173,30 +216,54 @@ inline EdgeFunctions edge_functions(const PreparedRay& ray, const float (&corner
     // The error bound of the float filter (traverse.cpp), with 2^-53 for 2^-24 and this triangle's
     // farthest coordinate for the scene's.
     const double error = 0x1p-50 * farthest;
-    const double bound = (4.0 * error + 0x1p-50 * largest) * largest + 2.0 * error * error;
+    edges.bound = (4.0 * error + 0x1p-50 * largest) * largest + 2.0 * error * error;
     const auto decide = [&](double& value, int from, int to) {
-        if (std::abs(value) <= bound) value = exact_edge_function(ray, corners[from], corners[to]);
+        if (std::abs(value) <= edges.bound)
+            value = exact_edge_function(ray, corners[from], corners[to]);
     };
     decide(edges.a, 2, 1);
     decide(edges.b, 0, 2);
     decide(edges.c, 1, 0);
+    edges.farthest = farthest;
     return edges;
 }
 
 /// Whether the ray meets the triangle; then t (scaled), u and v are the answer's. `corners` is
 /// [corner a, b, c][axis]. Triangles without area are never met, nor is one in whose plane the ray
 /// runs.
+///
+/// t is the mean of the corners' depths z, weighted by the edge functions. In double, an error e in
+/// each of them moves it by no more than 3 e d / A, to first order, for the largest deviation d of
+/// a z from t and the sum A of the weights; the roundings of mean and quotient by 2^-50 of the
+/// largest |z|. `doubt` is A times that, with 4 for 3. Where it does not tell t to a unit in the
+/// last place of float, or on which side of t_min or t_max, the crossing is computed without
+/// rounding errors.
 inline bool meets_triangle(const PreparedRay& ray, const float (&corners)[3][3], float& t, float& u,
                            float& v) {
-    const auto [a, b, c, z] = edge_functions(ray, corners);
+    const auto [a, b, c, z, error, farthest] = edge_functions(ray, corners);
     if ((a < 0.0 || b < 0.0 || c < 0.0) && (a > 0.0 || b > 0.0 || c > 0.0)) return false;
     const double area = a + b + c;
     if (area == 0.0) return false;
-    t = float((a * z[0] + b * z[1] + c * z[2]) * ray.shear_zd / area);
-    u = float(b / area);
-    v = float(c / area);
+    const double depth = (a * z[0] + b * z[1] + c * z[2]) / area;
+    PlaneCrossing crossing{depth * ray.shear_zd, b / area, c / area};
 
-    // The own box, in the arithmetic of the nodes' boxes.
+    const double size = std::abs(area);
+    const double deviation =
+        std::max({std::abs(z[0] - depth), std::abs(z[1] - depth), std::abs(z[2] - depth)});
+    const double doubt =
+        (4.0 * error * deviation + 0x1p-50 * farthest * size) * std::abs(ray.shear_zd);
+    const double past_first = (crossing.t - ray.t_first) * size;
+    const double before_last = (ray.t_last - crossing.t) * size;
+    const bool vague = 0x1p26 * error > size;
+    if (!vague && (past_first < -doubt || before_last < -doubt)) return false;
+    if (vague || 0x1p24 * doubt > std::abs(crossing.t) * size || past_first <= doubt ||
+        before_last <= doubt) {
+        if (!exact_plane_crossing(ray, corners, crossing)) return false;
+    }
+    u = float(crossing.u);
+    v = float(crossing.v);
+
+    // The own box, in the arithmetic of the nodes' boxes. Its interval is within [t_min, t_max].
     float planes[6];
     for (int axis = 0; axis < 3; ++axis) {
         const float p = corners[0][axis], q = corners[1][axis], r = corners[2][axis];
@@ -206,8 +273,7 @@ inline bool meets_triangle(const PreparedRay& ray, const float (&corners)[3][3],
     float near, far;
     box_interval(ray, planes, near, far);
     if (!(near <= far)) return false;
-    if (t < ray.t_min || t > ray.t_max) return false;
-    t = std::clamp(t, near, far);
+    t = std::clamp(float(crossing.t), near, far);
     return true;
 }
 

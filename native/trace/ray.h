@@ -55,6 +55,8 @@ struct HitsOf {
     double key_seconds = 0.0;  ///< computing sort keys
     double sort_seconds = 0.0;
     double traverse_seconds = 0.0;
+    double prepare_seconds = 0.0;    ///< making transforms of the tree's triangles; in no sum
+    std::size_t prepared_bytes = 0;  ///< of the transforms that the triangle test reads
     double seconds() const { return key_seconds + sort_seconds + traverse_seconds; }
 };
 using Hits = HitsOf<float>;

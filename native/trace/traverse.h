@@ -7,6 +7,7 @@
 
 #include "bvh/wide_bvh.h"
 #include "trace/ray.h"
+#include "trace/trace.h"
 
 namespace bvhlab {
 
@@ -25,6 +26,9 @@ struct TraceTask {
     const std::uint32_t* order;
     std::size_t begin, end;
     bool any_hit, count;
+    TriangleTest triangle_test;
+    BoxTest box_test;
+    const TriangleTransforms* transforms;  ///< for tests that need them, else null
     Hits* hits;
     std::vector<StackEntry>* stack;  ///< large enough for the tree's depth: see stack_size()
 };
@@ -36,5 +40,12 @@ inline std::size_t stack_size(const Bvh& bvh) {
 
 /// Traverses one share with the widest SIMD instructions of this processor.
 void traverse(const TraceTask& task);
+
+// The same with one triangle test: a translation unit each, to compile side by side.
+void traverse_watertight(const TraceTask& task);
+void traverse_watertight_plain(const TraceTask& task);
+void traverse_moller_trumbore(const TraceTask& task);
+void traverse_woop_affine(const TraceTask& task);
+void traverse_baldwin_weber(const TraceTask& task);
 
 }  // namespace bvhlab

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <set>
+#include <type_traits>
 #include <vector>
 
 #include "base/parallel.h"
@@ -15,6 +16,7 @@ namespace bvhlab {
 namespace {
 
 using test::build;
+using test::compressed;
 using test::copies;
 using test::random_soup;
 using test::rooms;
@@ -68,19 +70,19 @@ long double area_inside(const Triangle& triangle, const Box& box) {
 }
 
 /// Adds C_n times the outside area of every node below `node`; returns the triangles below it.
-template <unsigned K>
-std::set<std::uint32_t> add_overlaps(const Mesh& mesh, const WideBvh<K>& wide, std::uint32_t node,
+template <class Tree>
+std::set<std::uint32_t> add_overlaps(const Mesh& mesh, const Tree& wide, std::uint32_t node,
                                      const CostModel& model, long double& sum) {
+    constexpr unsigned K = Tree::branching;
+    constexpr unsigned group = K == 2 || std::is_same_v<Tree, CompressedBvh> ? 1 : K;
     std::set<std::uint32_t> all;
-    const WideNode<K>& parent = wide.nodes[node];
+    const WideNode<K>& parent = wide.node(node);
     for (unsigned i = 0; i < K && !parent.is_missing(i); ++i) {
         std::set<std::uint32_t> own;
         long double work = model.traversal;
         if (parent.is_leaf(i)) {
             for (std::uint32_t lane = 0; lane < parent.count[i]; ++lane)
-                own.insert(wide.blocks[parent.child[i] + lane / WideBvh<K>::lanes]
-                               .triangle[lane % WideBvh<K>::lanes]);
-            const unsigned group = K == 2 ? 1 : K;
+                own.insert(wide.reference(parent.child[i], lane));
             work = model.intersection * double((parent.count[i] + group - 1) / group * group);
         } else {
             own = add_overlaps(mesh, wide, parent.child[i], model, sum);
@@ -108,7 +110,7 @@ TEST(EndPointOverlap, IsThatOfEveryTriangleCutByEveryNode) {
     for (const Mesh& plain : meshes) {
         const auto mesh = shared(Mesh(plain));
         for (const char* builder : {"lbvh", "sah", "sbvh"}) {
-            for (const unsigned branching : {2U, 4U, 8U}) {
+            for (const unsigned branching : {2U, 4U, 8U, compressed}) {
                 for (const CostModel& model : models) {
                     const Bvh bvh = build(mesh, builder, branching, model);
                     const double expected = brute_epo(bvh, model);

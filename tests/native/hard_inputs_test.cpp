@@ -142,14 +142,16 @@ TEST_P(HardInputs, BuildAndGiveTheHitsOfLbvh) {
     const BinaryBvh binary = builder.build(*mesh, {}, check_parameters(builder, given), token, log);
     ASSERT_NO_THROW(validate(binary, *mesh));
 
-    for (const unsigned branching : {2U, 4U, 8U}) {
-        const Bvh bvh = collapse(binary, mesh, branching, {}, token);
-        ASSERT_NO_THROW(validate(bvh));
+    for (const std::string shape : {"2", "4", "8", "cwbvh"}) {
+        const Bvh bvh = shape == "cwbvh"
+                            ? compress(binary, mesh, {}, token)
+                            : collapse(binary, mesh, unsigned(std::stoi(shape)), {}, token);
+        ASSERT_NO_THROW(validate(bvh)) << shape;
         const Hits hits = trace(bvh, rays.batch(), {}, token);
-        EXPECT_EQ(hits.triangle, expected.triangle) << branching;
-        EXPECT_TRUE(same_bits(hits.t, expected.t)) << branching;
-        EXPECT_TRUE(same_bits(hits.u, expected.u)) << branching;
-        EXPECT_TRUE(same_bits(hits.v, expected.v)) << branching;
+        EXPECT_EQ(hits.triangle, expected.triangle) << shape;
+        EXPECT_TRUE(same_bits(hits.t, expected.t)) << shape;
+        EXPECT_TRUE(same_bits(hits.u, expected.u)) << shape;
+        EXPECT_TRUE(same_bits(hits.v, expected.v)) << shape;
     }
 }
 

@@ -16,12 +16,16 @@
 /// Trees and meshes for the tests of metrics.
 namespace bvhlab::test {
 
+/// Stands for a branching factor: 8 in compressed nodes.
+inline constexpr unsigned compressed = 80;
+
 inline Bvh build(std::shared_ptr<const Mesh> mesh, const std::string& id, unsigned branching,
                  const CostModel& model = {}) {
     Token token;
     BuildLog log;
     const BuilderInfo& builder = find_builder(id);
     const BinaryBvh binary = builder.build(*mesh, model, check_parameters(builder, {}), token, log);
+    if (branching == compressed) return compress(binary, std::move(mesh), model, token);
     return collapse(binary, std::move(mesh), branching, model, token);
 }
 

@@ -17,6 +17,7 @@ namespace bvhlab {
 namespace {
 
 using test::build;
+using test::compressed;
 using test::copies;
 using test::growing_chain;
 using test::random_soup;
@@ -37,13 +38,16 @@ LeafCounts leaf_counts(const Bvh& bvh, std::size_t lines) {
 /// Sum of the leaves' areas over the scene's.
 double expected_leaves(const Bvh& bvh) {
     return std::visit(
-        []<unsigned K>(const WideBvh<K>& wide) {
+        []<class Tree>(const Tree& wide) {
+            constexpr unsigned K = Tree::branching;
             Box scene = Box::empty();
-            for (unsigned i = 0; i < K; ++i) scene.grow(wide.nodes[0].box(i));
+            for (unsigned i = 0; i < K; ++i) scene.grow(wide.node(0).box(i));
             double sum = 0.0;
-            for (const WideNode<K>& node : wide.nodes)
+            for (std::size_t n = 0; n < wide.nodes.size(); ++n) {
+                const WideNode<K>& node = wide.node(n);
                 for (unsigned i = 0; i < K; ++i)
                     if (node.is_leaf(i)) sum += node.box(i).half_area();
+            }
             return sum / scene.half_area();
         },
         bvh.tree);
@@ -60,7 +64,7 @@ TEST(LeafCounts, HaveTheMeanThatAreasPredict) {
     for (const Mesh& plain : meshes) {
         const auto mesh = shared(Mesh(plain));
         for (const char* builder : {"lbvh", "sbvh"}) {
-            for (const unsigned branching : {2U, 4U, 8U}) {
+            for (const unsigned branching : {2U, 4U, 8U, compressed}) {
                 const Bvh bvh = build(mesh, builder, branching);
                 const LeafCounts counts = leaf_counts(bvh, 1 << 14);
                 const double error = counts.deviation / 128.0;

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Traversal with the test of Moeller and Trumbore, compiled once per instruction set.
+#include "trace/targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "trace/traverse_moller_trumbore.cpp"
+#include <hwy/foreach_target.h>
+// After foreach_target.h, which includes this file again for each target.
+#include "trace/plain_ray.h"
+#include "trace/published_tests-inl.h"
+#include "trace/traverse-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace bvhlab {
+namespace HWY_NAMESPACE {
+
+void moller_trumbore_task(const TraceTask& task) {
+    task.box_test == BoxTest::plain ? traverse_tree<MollerTrumbore, PlainRay>(task)
+                                    : traverse_tree<MollerTrumbore, BoxRay>(task);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace bvhlab
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace bvhlab {
+
+HWY_EXPORT(moller_trumbore_task);
+
+void traverse_moller_trumbore(const TraceTask& task) {
+    HWY_DYNAMIC_DISPATCH(moller_trumbore_task)(task);
+}
+
+}  // namespace bvhlab
+#endif
