@@ -16,20 +16,23 @@ SbvhConfig sbvh_config(const Parameters& parameters) {
             .max_references = value("max_references")};
 }
 
+std::size_t duplicate_budget(std::size_t triangles, double max_references) {
+    const double wanted = (max_references - 1.0) * double(triangles);
+    return std::size_t(std::min(wanted, double(most_references - triangles)));
+}
+
 BinaryBvh build_sbvh(const Mesh& mesh, const CostModel& model, const SbvhConfig& config,
                      Token& token) {
-    // Node numbers have 32 bits, so there can be at most 2^31 references.
-    const double most_duplicates = double((std::size_t(1) << 31) - mesh.size());
-    const double duplicates = (config.max_references - 1.0) * double(mesh.size());
-    return build_top_down(mesh,
-                          {.stage = "building SBVH",
-                           .model = model,
-                           .max_spatial_depth = config.max_spatial_depth,
-                           .spatial_bins = config.spatial_bins,
-                           .min_overlap = config.alpha,
-                           .max_leaf_size = std::size_t(config.max_leaf_size),
-                           .duplicate_budget = std::size_t(std::min(duplicates, most_duplicates))},
-                          token);
+    return build_top_down(
+        mesh,
+        {.stage = "building SBVH",
+         .model = model,
+         .max_spatial_depth = config.max_spatial_depth,
+         .spatial_bins = config.spatial_bins,
+         .min_overlap = config.alpha,
+         .max_leaf_size = std::size_t(config.max_leaf_size),
+         .duplicate_budget = duplicate_budget(mesh.size(), config.max_references)},
+        token);
 }
 
 }  // namespace bvhlab

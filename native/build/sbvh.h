@@ -39,6 +39,10 @@ inline constexpr std::array<ParameterInfo, 5> sbvh_parameters{{
 /// The settings in checked parameters (check_parameters).
 SbvhConfig sbvh_config(const Parameters& parameters);
 
+/// Duplicates that the tree of a mesh of so many triangles may hold: at most most_references are
+/// left in all.
+std::size_t duplicate_budget(std::size_t triangles, double max_references);
+
 /// Spatial splits in BVHs (Stich, Friedrich, Dietrich 2009): as build_sah, but where the children
 /// of a node would overlap, references may be cut at a plane and go to both children, if that costs
 /// less.

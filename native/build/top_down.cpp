@@ -8,6 +8,7 @@
 #include <atomic>
 #include <vector>
 
+#include "base/parallel.h"
 #include "build/chunks.h"
 #include "build/clip.h"
 #include "build/splitter.h"
@@ -121,17 +122,25 @@ public:
     BinaryBvh build(const TopDownConfig& config) {
         const NodeState root{mesh_.size(), config.duplicate_budget, 0, true};
         nodes_.push_back(TopNode{root, 1.0, sorted_references(mesh_, token_), 0, 0, {}, 0, 0, 0});
-        tasks_.run_and_wait([this] { grow(0); });
+        grow_all();
         return number_nodes();
     }
 
 private:
+    void grow_all() {
+        const ForkJoin call;
+        tbb::task_group tasks;
+        tasks.run_and_wait(call.task([&] { grow(0, tasks, call); }));
+    }
+
     /// Grows the subtree of a top node; each right child is a task of its own.
-    void grow(std::uint32_t index) {
+    void grow(std::uint32_t index, tbb::task_group& tasks, const ForkJoin& call) {
         SplitScratch scratch;
         while (nodes_[index].state.size > chunk_size) {
             split(index, scratch);
-            tasks_.run([this, right = nodes_[index].right] { grow(right); });
+            call.fork();
+            tasks.run(call.task(
+                [this, right = nodes_[index].right, &tasks, &call] { grow(right, tasks, call); }));
             index = nodes_[index].left;
         }
         TopNode& node = nodes_[index];
@@ -181,8 +190,7 @@ private:
             right.first_leaf = node.first_leaf + std::uint32_t(left.leaf_count);
             bvh.children[node.first_node] = {root_of(bvh, left), root_of(bvh, right)};
         }
-        tbb::parallel_for(std::size_t(0), nodes_.size(), [&](std::size_t i) {
-            token_.check();
+        parallel_for_each(nodes_.size(), 1, token_, [&](std::size_t i) {
             if (nodes_[i].is_fragment()) place(nodes_[i], bvh);
         });
         for (std::size_t i = nodes_.size(); i-- > 0;)
@@ -223,7 +231,6 @@ private:
     Token& token_;
     Splitter splitter_;
     tbb::concurrent_vector<TopNode> nodes_;
-    tbb::task_group tasks_;
     std::atomic<double> done_{0.0};
 };
 

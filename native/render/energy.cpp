@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "render/energy.h"
 
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <atomic>
@@ -10,6 +9,7 @@
 #include <numbers>
 #include <vector>
 
+#include "base/parallel.h"
 #include "render/microfacet.h"
 
 namespace bvhlab {
@@ -102,7 +102,8 @@ DielectricShares dielectric_shares(float cosine, float roughness, float eta) {
 template <class Function>
 void for_each_node(const Function& function) {
     tbb::this_task_arena::isolate([&] {
-        tbb::parallel_for(0, EnergyTable::roughnesses, [&](int row) {
+        parallel_for_each(EnergyTable::roughnesses, 1, Token(), [&](std::size_t i) {
+            const int row = int(i);
             for (int column = 0; column < EnergyTable::cosines; ++column)
                 function(row, column, EnergyTable::cosine_of(column),
                          EnergyTable::roughness_of(row));

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "render/offset.h"
 #include "render/sample_shapes.h"
 #include "render/spherical_rectangle.h"
 #include "scene/color.h"
@@ -17,6 +18,9 @@ namespace {
 using std::numbers::pi;
 
 constexpr double smallest_angle = 0x1p-23;
+/// Sine of the least angle at which geometry through the middle of a disk lamp may be crossed
+/// without hiding it.
+constexpr double disk_sine = 0.25;
 /// A rectangle is drawn by solid angle where that is above about this many steradians: large enough
 /// to be computed and to matter.
 constexpr double smallest_solid_angle = 1e-4;
@@ -51,6 +55,7 @@ Lamp::Lamp(const Light& light)
         strength_ /= 4.0 * pi;
         luminance_ /= 4.0 * pi;
     }
+    reach_ = glm::length(centre_) + glm::length(edge_x_) + glm::length(edge_y_);
     if (kind_ == LightKind::sun)
         extent_ = light.size_x > smallest_angle ? sagitta(light.size_x) : 0.0;
     if (kind_ != LightKind::area) return;
@@ -69,17 +74,22 @@ Lamp::Lamp(const Light& light)
     luminance_ /= pi * extent_;
 }
 
+/// Distance at which a ray counts as meeting the lamp, whose plane it crosses at `distance` and at
+/// an angle of this sine: off the plane (end_clearance), so that geometry in it does not hide it.
+double Lamp::nearer(double distance, double sine) const {
+    return std::max(0.0, distance - end_clearance * (reach_ + distance) / sine);
+}
+
 LightSample Lamp::sample(const glm::dvec3& position, const glm::dvec2& random) const {
-    switch (kind_) {
-        case LightKind::point:
-        case LightKind::spot:
-            return sample_disk_lamp(position, random);
-        case LightKind::sun:
-            return sample_sun(random);
-        case LightKind::area:
-            return sample_area(position, random);
-    }
-    return {};
+    if (kind_ == LightKind::sun) return sample_sun(random);
+    const bool area = kind_ == LightKind::area;
+    LightSample sample = area ? sample_area(position, random) : sample_disk_lamp(position, random);
+    const double distance = glm::length(sample.to_light);
+    if (!(distance > 0.0)) return sample;
+    // Disks face the position, so that what lies in their plane is crossed aslant, if at all.
+    const double sine = area ? glm::dot(sample.to_light, back_) / distance : disk_sine;
+    sample.to_light *= sine > 0.0 ? nearer(distance, sine) / distance : 0.0;
+    return sample;
 }
 
 bool Lamp::meet(const glm::dvec3& position, const glm::dvec3& direction, LampHit& hit,
@@ -129,7 +139,9 @@ bool Lamp::meet_disk_lamp(const glm::dvec3& position, const glm::dvec3& directio
     const glm::dvec3 to_centre = centre_ - position;
     const double squared = glm::dot(to_centre, to_centre);
     const double along = glm::dot(to_centre, direction);
-    if (!(along > 0.0) || squared > t_max * along) return false;
+    if (!(along > 0.0)) return false;
+    hit.distance = nearer(squared / along, disk_sine);
+    if (hit.distance > t_max) return false;
     // The disk's plane is squared / along away; there, the ray passes the centre at distance
     // |to_centre| tan(angle), and cross = |to_centre| sin(angle).
     const glm::dvec3 cross = glm::cross(to_centre, direction);
@@ -138,9 +150,9 @@ bool Lamp::meet_disk_lamp(const glm::dvec3& position, const glm::dvec3& directio
     if (!(extent_ > smallest_angle * distance)) return false;
     const double mask = kind_ == LightKind::spot ? spot_mask(-direction) : 1.0;
     if (mask == 0.0) return false;
-    hit.distance = squared / along;
     hit.radiance = strength_ * (mask / (pi * extent_ * extent_));
-    hit.pdf = hit.distance * hit.distance * distance / (along * pi * extent_ * extent_);
+    const double reach = squared / along;
+    hit.pdf = reach * reach * distance / (along * pi * extent_ * extent_);
     return true;
 }
 
@@ -197,7 +209,8 @@ bool Lamp::meet_area(const glm::dvec3& position, const glm::dvec3& direction, La
     const double height = glm::dot(to_centre, back_);
     if (!(height > 0.0)) return false;
     const double distance = height / slope;
-    if (distance > t_max) return false;
+    hit.distance = nearer(distance, slope);
+    if (hit.distance > t_max) return false;
     const glm::dvec3 place = direction * distance - to_centre;
 
     // Coordinates along the edges, -0.5 to 0.5; cross products, as edges may be sheared.
@@ -209,7 +222,6 @@ bool Lamp::meet_area(const glm::dvec3& position, const glm::dvec3& direction, La
 
     const double squared_distance = glm::dot(to_centre, to_centre);
     hit.radiance = strength_;
-    hit.distance = distance;
     if (is_drawn_by_solid_angle(squared_distance)) {
         const SphericalRectangle seen(to_centre - 0.5 * (edge_x_ + edge_y_), unit_x_, unit_y_,
                                       size_);

@@ -37,6 +37,9 @@ struct LampHit {
 /// its axis. (Cycles' "soft falloff", the default; it stays finite where the lamp touches a
 /// surface, and is a sphere's look from afar.) A sun is a disk at infinity.
 ///
+/// Geometry in a lamp's own plane does not hide it: every position sees lamps some units in the
+/// last place of their coordinates and distance nearer than they are.
+///
 /// An extent is none where it is seen under less than about 2^-23 radians, the step of float
 /// directions.
 class Lamp {
@@ -60,6 +63,7 @@ public:
     double brightness(const glm::dvec3& position, const glm::dvec3& normal) const;
 
 private:
+    double nearer(double distance, double sine) const;
     LightSample sample_disk_lamp(const glm::dvec3& position, const glm::dvec2& random) const;
     LightSample sample_sun(const glm::dvec2& random) const;
     LightSample sample_area(const glm::dvec3& position, const glm::dvec2& random) const;
@@ -76,6 +80,7 @@ private:
     LightKind kind_;
     bool ellipse_, right_angled_;
     glm::dvec3 centre_;
+    double reach_ = 0.0;          ///< size of the coordinates of its farthest point
     glm::dvec3 back_;             ///< unit vector against the direction in which the lamp shines
     glm::dvec3 edge_x_, edge_y_;  ///< of an area
     glm::dvec3 unit_x_{0.0}, unit_y_{0.0};  ///< along them

@@ -225,7 +225,9 @@ LightSample LightSampler::sample_emitter(const LightOdds& odds, const glm::dvec3
     const double u = root * (1.0 - random.y), v = root * random.y;
     const Triangle corners = scene_->mesh->triangle(triangle);
     const SurfacePoint point = surface_point(corners, u, v, glm::dvec3(corners.a) - position);
-    LightSample sample{.to_light = glm::dvec3(offset_origin(point, point.normal)) - position};
+    LightSample sample{.to_light = point.position - position};
+    const double size = glm::length(point.position) + glm::length(sample.to_light);
+    sample.to_light += end_clearance * size * point.normal;
 
     const double distance = glm::length(sample.to_light);
     const double towards = -glm::dot(sample.to_light, point.normal);

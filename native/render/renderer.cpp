@@ -2,6 +2,8 @@
 #include "render/renderer.h"
 
 #include <algorithm>
+#include <stdexcept>
+#include <string>
 
 #include "base/parallel.h"
 
@@ -16,6 +18,14 @@ std::size_t pixel_count(const View& view) {
 }
 
 }  // namespace
+
+std::uint32_t added_samples(std::uint32_t present, std::uint32_t more) {
+    if (present > most_samples || more > most_samples - present)
+        throw std::invalid_argument("a picture has at most " + std::to_string(most_samples) +
+                                    " samples a pixel; this one has " + std::to_string(present) +
+                                    ", and " + std::to_string(more) + " more were asked for");
+    return present + more;
+}
 
 double Picture::trace_seconds() const {
     double sum = 0.0;
@@ -43,8 +53,9 @@ Picture Renderer::picture() const {
 
 void Renderer::render(std::uint32_t samples, Token& token) {
     const std::lock_guard lock(rendering_);
+    const std::uint32_t target = added_samples(samples_, samples);
     token.begin("rendering");
-    with_threads(options_.threads, [&] { render_to(samples_ + samples, token); });
+    with_threads(options_.threads, [&] { render_to(target, token); });
 }
 
 /// The next batch on the way to `target` samples: first what is left of a pass, in the order of the

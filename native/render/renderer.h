@@ -14,6 +14,9 @@ namespace bvhlab {
 /// Largest number of samples a pixel, so that sums of sample counts fit in 32 bits.
 inline constexpr std::uint32_t most_samples = 1U << 24;
 
+/// The sum. Throws std::invalid_argument where a picture cannot have so many samples.
+std::uint32_t added_samples(std::uint32_t present, std::uint32_t more);
+
 struct RenderOptions {
     TracerOptions tracer;
     int threads = 0;  ///< 0: all
@@ -40,6 +43,7 @@ public:
 
     /// Adds samples to every pixel. After Cancelled it keeps what was finished, which may leave the
     /// upper pixels with more samples than the lower ones; the next call first makes up for that.
+    /// Throws std::invalid_argument beyond most_samples in all.
     void render(std::uint32_t samples, Token& token);
 
     /// Samples that every pixel has. May be called while another thread renders.

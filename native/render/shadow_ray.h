@@ -9,9 +9,9 @@
 
 namespace bvhlab {
 
-/// Share of the way to a lamp at which shadow rays stop: geometry in the lamp's own plane, and the
-/// emitting triangle itself, must not shadow it.
-inline constexpr float shadow_reach = 1.0F - 0x1p-16F;
+/// Share of the way at which shadow rays to a point end: before it. Points of lamps and emitting
+/// triangles keep off these (end_clearance), so that what is met there is met at t >= 1.
+inline constexpr float shadow_reach = 1.0F - 0x1p-24F;
 
 /// The ray from `origin`, near the surface, to the light that was sampled from it, for t_min = 0.
 /// Its direction is not normalised but runs to the sampled point, which is at t = 1, and t_max is

@@ -40,12 +40,15 @@ void check_triangles(const Array<glm::uvec3>& triangles, std::size_t vertex_coun
 
 }  // namespace
 
-Mesh make_mesh(Array<glm::vec3> vertices, Array<glm::uvec3> triangles) {
-    constexpr std::size_t most_triangles = std::size_t(1) << 28;
-    if (triangles.empty()) throw std::invalid_argument("the mesh has no triangles");
-    if (triangles.size() > most_triangles)
-        throw std::invalid_argument("the mesh has " + std::to_string(triangles.size()) +
+void check_triangle_count(std::size_t count) {
+    if (count == 0) throw std::invalid_argument("the mesh has no triangles");
+    if (count > most_triangles)
+        throw std::invalid_argument("the mesh has " + std::to_string(count) +
                                     " triangles; at most 2^28 are supported");
+}
+
+Mesh make_mesh(Array<glm::vec3> vertices, Array<glm::uvec3> triangles) {
+    check_triangle_count(triangles.size());
     check_vertices(vertices);
     check_triangles(triangles, vertices.size());
 

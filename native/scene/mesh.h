@@ -13,13 +13,16 @@ namespace bvhlab {
 /// Index of a triangle that is not there: a miss.
 inline constexpr std::uint32_t no_triangle = 0xFFFFFFFFU;
 
+/// Triangles of a mesh at most, so that node and block numbers fit in 32 bits.
+inline constexpr std::size_t most_triangles = std::size_t(1) << 28;
+
 /// Corners of one triangle.
 struct Triangle {
     glm::vec3 a, b, c;
 };
 
 /// Triangles in world space. Once made it is trusted: indices in range, coordinates finite, at
-/// least one triangle and at most 2^28 (so that node and block indices fit in 32 bits).
+/// least one triangle and at most most_triangles.
 struct Mesh {
     Array<glm::vec3> vertices;
     Array<glm::uvec3> triangles;
@@ -40,6 +43,9 @@ struct Mesh {
         return box;
     }
 };
+
+/// Throws std::invalid_argument where a mesh cannot have so many triangles.
+void check_triangle_count(std::size_t count);
 
 /// Checks the arrays and computes the bounds.
 /// Throws std::invalid_argument naming the first bad vertex or triangle.

@@ -15,8 +15,6 @@
 namespace bvhlab {
 namespace {
 
-constexpr float infinity = std::numeric_limits<float>::infinity();
-
 SceneParts parts_of(Mesh mesh) {
     SceneParts parts;
     parts.mesh = test::shared(std::move(mesh));
