@@ -51,10 +51,12 @@ if __name__ == "__main__":
 import argparse
 import io
 import json
+import os
 import shutil
 import signal
-from collections.abc import Sequence
-from contextlib import ExitStack
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from types import FrameType, ModuleType
 from typing import NoReturn
 
@@ -88,10 +90,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without ± gets a ?
     try:
-        arguments = _parser().parse_args(argv)
-        return int(arguments.command(arguments))
+        with _stopped_by_sigterm():
+            arguments = _parser().parse_args(argv)
+            code = int(arguments.command(arguments))
+            _print("")  # what is left in the buffer
+            return code
     except UsageError as error:
         return _fail(error, 2)
+    except Terminated as error:
+        return _fail(error, 128 + signal.SIGTERM)
     except (NativeMissing, ValueError, OSError) as error:
         return _fail(error, 1)
     except MemoryError:
@@ -100,8 +107,38 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(KeyboardInterrupt("stopped"), 128 + signal.SIGINT)
     except SystemExit as end:  # --help
         return int(end.code or 0)
+
+
+class Terminated(BaseException):
+    """SIGTERM outside of a study: what was begun is cleaned up on the way out."""
+
+
+@contextmanager
+def _stopped_by_sigterm() -> Iterator[None]:
+    """Turn SIGTERM into `Terminated`; the study itself (`_run`) keeps what it has instead."""
+
+    def stop(signum: int, frame: FrameType | None) -> None:
+        raise Terminated("stopped")
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
     finally:
-        sys.stdout.flush()
+        # None is a handler of Blender's own, in C, that Python cannot give back.
+        signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
+
+
+def _print(text: str) -> None:
+    """Print to stdout, now. Raises an OSError that says so where that cannot be written."""
+    try:
+        print(text, end="\n" if text else "", flush=True)
+    except OSError as error:
+        # What stays in the buffer would fail again, with a traceback, when Python ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise OSError(f"the standard output cannot be written: {error.strerror}") from error
 
 
 def _fail(error: BaseException, code: int) -> int:
@@ -112,7 +149,9 @@ def _fail(error: BaseException, code: int) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="bvh_lab", description="Compare bounding volume hierarchies on a scene.")
-    commands = parser.add_subparsers(required=True, metavar="compare | builders | devices")
+    commands = parser.add_subparsers(
+        required=True, metavar="compare | builders | devices | precisions"
+    )
     compare = commands.add_parser(
         "compare", help="build, trace and render every variant; print a table"
     )
@@ -137,6 +176,7 @@ def _parser() -> argparse.ArgumentParser:
     for name, command, text in (
         ("builders", _builders, "list the builders with their parameters"),
         ("devices", _devices, "list the devices, and Embree"),
+        ("precisions", _precisions, "list the layouts of nodes and the triangle and box tests"),
     ):
         listing = commands.add_parser(name, help=text)
         listing.set_defaults(command=command)
@@ -154,12 +194,44 @@ def _compare(arguments: argparse.Namespace) -> int:
         staging = _staging(arguments.out, stack) if arguments.out else None
         scene, host = _open_scene(arguments, plan)
         study, signum = _run(Job(scene, plan, host))
-        code = _show(study, arguments)
-        if staging is not None:
-            fill_report(study.result, study.pictures, staging)
-            publish_folder(staging, arguments.out)
-            print(f"bvh_lab: wrote {arguments.out}", file=sys.stderr)
+        code = _put_out(study, arguments, staging)
     return 128 + signum if signum else code
+
+
+def _put_out(study: Study, arguments: argparse.Namespace, staging: Path | None) -> int:
+    """Print and write the results, as much as can be, and give the exit code.
+
+    Where one of the outputs fails, the others still hold the results.
+    """
+    code = 0
+    for put in (_show, _write_json, _write_folder):
+        try:
+            code = max(code, put(study, arguments, staging))
+        except OSError as error:
+            code = _fail(error, 1)
+    return code
+
+
+def _write_json(study: Study, arguments: argparse.Namespace, staging: Path | None) -> int:
+    if arguments.json is None or arguments.json == "-":
+        return 0
+    try:
+        write_text_aside(Path(arguments.json), study.result.to_json())
+    except OSError as error:
+        raise _unwritable("--json", arguments.json, error) from error
+    return 0
+
+
+def _write_folder(study: Study, arguments: argparse.Namespace, staging: Path | None) -> int:
+    if staging is None:
+        return 0
+    try:
+        fill_report(study.result, study.pictures, staging)
+        publish_folder(staging, arguments.out)
+    except OSError as error:
+        raise _unwritable("--out", arguments.out, error) from error
+    print(f"bvh_lab: wrote {arguments.out}", file=sys.stderr)
+    return 0
 
 
 def _check_json_path(path: str | None) -> None:
@@ -244,31 +316,26 @@ def _run(job: Job) -> tuple[Study, int]:
     return job.study, caught
 
 
-def _show(study: Study, arguments: argparse.Namespace) -> int:
+def _show(study: Study, arguments: argparse.Namespace, staging: Path | None) -> int:
     """Print the result and give the exit code."""
     result = study.result
-    if arguments.json == "-":
-        print(result.to_json())
-    else:
-        width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-        print(text_report(result, width))
-        if arguments.json:
-            write_text_aside(Path(arguments.json), result.to_json())
     for failure in failures(result):
         print(f"bvh_lab: error: {failure}", file=sys.stderr)
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    _print(result.to_json() if arguments.json == "-" else text_report(result, width))
     return 1 if result.failed() else 0
 
 
 def _builders(arguments: argparse.Namespace) -> int:
     builders = load().builders()
     if arguments.json:
-        print(json.dumps(builders, indent=1, ensure_ascii=False))
+        _print(json.dumps(builders, indent=1, ensure_ascii=False))
         return 0
     for builder in builders:
-        print(f"{builder['id']:<10}{builder['label']}: {builder['source']}")
+        _print(f"{builder['id']:<10}{builder['label']}: {builder['source']}")
         for parameter in builder["parameters"]:
             unit = f" {parameter['unit']}" if parameter["unit"] else ""
-            print(
+            _print(
                 f"{'':10}  {builder['id']}.{parameter['name']} = {parameter['default']:g}{unit} "
                 f"({parameter['minimum']:g} to {parameter['maximum']:g}): "
                 f"{parameter['description']}"
@@ -280,10 +347,25 @@ def _devices(arguments: argparse.Namespace) -> int:
     core = load()
     devices, embree = core.devices(), core.embree()
     if arguments.json:
-        print(json.dumps({"devices": devices, "embree": embree}, indent=1, ensure_ascii=False))
+        _print(json.dumps({"devices": devices, "embree": embree}, indent=1, ensure_ascii=False))
         return 0
     for device in devices:
         state = f"{device['threads']} threads" if device["available"] else device["reason"]
-        print(f"{device['id']:<10}{device['name']}: {state}")
-    print(f"{'embree':<10}{embree['version'] if embree['available'] else embree['reason']}")
+        _print(f"{device['id']:<10}{device['name']}: {state}")
+    _print(f"{'embree':<10}{embree['version'] if embree['available'] else embree['reason']}")
+    return 0
+
+
+def _precisions(arguments: argparse.Namespace) -> int:
+    choices = load().precisions()
+    if arguments.json:
+        _print(json.dumps(choices, indent=1, ensure_ascii=False))
+        return 0
+    for option, name in (
+        ("--layouts", "layout"),
+        ("--triangle-tests", "triangle_test"),
+        ("--box-tests", "box_test"),
+    ):
+        for choice in choices[name]:
+            _print(f"{option:<17} {choice['id']:<16}{choice['label']}: {choice['source']}")
     return 0

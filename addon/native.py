@@ -11,6 +11,7 @@ import functools
 import importlib
 import platform
 import re
+import struct
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from types import ModuleType
@@ -39,6 +40,7 @@ def package_version() -> str:
 @functools.cache
 def load() -> ModuleType:
     """The compiled module `_core`; raises `NativeMissing` where there is none that fits."""
+    _check_whole()
     try:
         module = importlib.import_module("._core", __package__)
     except ModuleNotFoundError as error:
@@ -47,12 +49,33 @@ def load() -> ModuleType:
         raise NativeMissing(_missing_file()) from None
     except ImportError as error:
         raise NativeMissing(f"The compiled core does not load: {error}; {REMEDY}") from error
-    if module.__version__ != package_version():
+    version = getattr(module, "__version__", None)
+    if version is None:
+        raise NativeMissing(f"{module.__file__} is not the core of BVH Lab; {REMEDY}")
+    if version != package_version():
         raise NativeMissing(
-            f"The compiled core is version {module.__version__}, but the add-on is version "
+            f"The compiled core is version {version}, but the add-on is version "
             f"{package_version()}; {REMEDY}, then restart"
         )
     return module
+
+
+def _check_whole() -> None:
+    """Raise where the file is cut short: the system's loader would end the process with SIGBUS.
+
+    An ELF file's section headers stand at its end; its header tells where.
+    """
+    path = next((p for s in EXTENSION_SUFFIXES if (p := FOLDER / f"_core{s}").is_file()), None)
+    if path is None:
+        return
+    with path.open("rb") as file:
+        header = file.read(64)
+    if header[:6] != b"\x7fELF\x02\x01" or len(header) < 64:
+        return  # not a 64-bit ELF file: the loader says what it is
+    (sections,) = struct.unpack_from("<Q", header, 40)
+    size, count = struct.unpack_from("<HH", header, 58)
+    if path.stat().st_size < sections + size * count:
+        raise NativeMissing(f"{path} is cut short; {REMEDY}")
 
 
 def _missing_file() -> str:

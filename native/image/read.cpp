@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -87,9 +88,7 @@ void unassociate(Array<std::uint8_t>& values) {
     }
 }
 
-}  // namespace
-
-Texture read_texture(const fs::path& path) {
+Texture read_checked(const fs::path& path) {
     const std::unique_ptr<OIIO::ImageInput> input = open(path);
     const OIIO::ImageSpec& spec = input->spec();
     const std::vector<int> kept = kept_channels(spec);
@@ -108,6 +107,16 @@ Texture read_texture(const fs::path& path) {
         if (associated) unassociate(texture.floats);
     }
     return texture;
+}
+
+}  // namespace
+
+Texture read_texture(const fs::path& path) {
+    try {
+        return read_checked(path);
+    } catch (const std::bad_alloc&) {
+        refuse(path, "its pixels do not fit in memory");
+    }
 }
 
 }  // namespace bvhlab

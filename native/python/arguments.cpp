@@ -24,7 +24,7 @@ DoubleArray numbers(const py::handle& argument, const char* name,
     const bool fits = (kind == 'f' || kind == 'i' || kind == 'u') && has_shape(array, shape);
     PyErr_Clear();
     if (!fits) throw py::value_error(std::string(name) + " must be numbers of shape " + shape_text);
-    return DoubleArray::ensure(array);
+    return converted<DoubleArray>(array);
 }
 
 glm::vec3 color_argument(const py::handle& argument, const char* name) {

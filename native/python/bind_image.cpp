@@ -2,6 +2,7 @@
 // write_image, image_difference, image_error.
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "python/convert.h"
@@ -28,6 +29,8 @@ public:
     const ImageView& view() const { return view_; }
 
 private:
+    static constexpr py::ssize_t largest_side = 65535;
+
     static FloatArray float_array(const py::handle& argument, const char* name) {
         const py::array array = py::array::ensure(argument);
         const char kind = array ? array.dtype().kind() : '?';
@@ -40,7 +43,11 @@ private:
         if (!fits)
             throw py::value_error(std::string(name) +
                                   " must have shape (H, W) or (H, W, C) with C 1, 3 or 4");
-        return FloatArray::ensure(array);
+        if (std::max(array.shape(0), array.shape(1)) > largest_side)
+            throw py::value_error(std::string(name) + " has " + std::to_string(array.shape(1)) +
+                                  " x " + std::to_string(array.shape(0)) +
+                                  " pixels; a side has at most " + std::to_string(largest_side));
+        return converted<FloatArray>(array);
     }
 
     FloatArray values_;
@@ -50,8 +57,18 @@ private:
 void write_picture(const py::object& path, const py::object& pixels) {
     const auto file = py::module_::import("os").attr("fspath")(path).cast<std::string>();
     const Picture picture(pixels, "pixels");
-    const py::gil_scoped_release release;
-    write_image(file, picture.view());
+    std::string problem;
+    {
+        const py::gil_scoped_release release;
+        try {
+            write_image(file, picture.view());
+        } catch (const std::runtime_error& error) {
+            problem = error.what();
+        }
+    }
+    if (problem.empty()) return;
+    PyErr_SetString(PyExc_OSError, problem.c_str());
+    throw py::error_already_set();
 }
 
 py::dict difference(const py::object& a, const py::object& b) {
@@ -109,7 +126,7 @@ void bind_image(py::module_& module) {
                R"(Write a picture, (H, W) or (H, W, 1 | 3 | 4) linear float32, top row first.
 
 The extension names the format: .exr (32-bit float, linear) or .png (8-bit sRGB, clipped to [0, 1]).
-The file is written aside and renamed. Raises ValueError for another extension or shape, RuntimeError
+The file is written aside and renamed. Raises ValueError for another extension or shape, OSError
 with file and reason where it cannot be written.)");
     module.def(
         "image_difference", &difference, py::arg("a"), py::arg("b"),

@@ -59,7 +59,7 @@ Model model_named(const std::string& name) {
 template <class Value>
 Array<Value> values_of(const py::array& pixels) {
     using Values = py::array_t<Value, py::array::c_style | py::array::forcecast>;
-    const Values values = Values::ensure(pixels);
+    const Values values = converted<Values>(pixels);
     return {values.data(), values.data() + values.size()};
 }
 

@@ -92,7 +92,7 @@ Array<std::uint32_t> material_index_argument(const py::handle& argument) {
     if ((kind != 'i' && kind != 'u') || array.ndim() != 1)
         throw py::value_error("material_index must be integers of shape (T,)");
     using Indices = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
-    const Indices wide = Indices::ensure(array);
+    const Indices wide = converted<Indices>(array);
     Array<std::uint32_t> indices(std::size_t(wide.size()));
     for (py::ssize_t i = 0; i < wide.size(); ++i) {
         if (wide.data()[i] < 0 || wide.data()[i] > 0xFFFFFFFFLL)
@@ -115,7 +115,7 @@ Array<Vector> corner_argument(const py::object& argument, const char* name,
     if ((kind != 'f' && kind != 'i' && kind != 'u') || array.ndim() != 3 || array.shape(1) != 3 ||
         array.shape(2) != width)
         throw py::value_error(std::string(name) + " must be numbers of shape " + shape_text);
-    const FloatArray floats = FloatArray::ensure(array);
+    const FloatArray floats = converted<FloatArray>(array);
     static_assert(sizeof(Vector) == width * sizeof(float));
     const auto* first = reinterpret_cast<const Vector*>(floats.data());
     return {first, first + 3 * floats.shape(0)};
@@ -149,6 +149,22 @@ py::dict features_of(const Scene& scene) {
     result["lamps"] = features.lamps;
     result["world"] = features.world;
     result["environment"] = features.environment;
+    return result;
+}
+
+/// Bytes of the arrays that a scene holds beside its mesh, by part; 0 where it has no such part.
+py::dict bytes_of(const Scene& scene) {
+    const auto bytes = [](const auto& array) { return array.size() * sizeof(array[0]); };
+    std::size_t texels = 0;
+    for (const auto& texture : scene.textures)
+        texels += bytes(texture->bytes) + bytes(texture->floats);
+    py::dict result;
+    result["materials"] = bytes(scene.materials) + bytes(scene.material_index);
+    result["lights"] = bytes(scene.lights);
+    result["lookups"] = bytes(scene.lookups);
+    result["textures"] = texels;
+    result["uvs"] = bytes(scene.uvs);
+    result["normals"] = bytes(scene.normals);
     return result;
 }
 
@@ -199,7 +215,9 @@ corner, or None. Raises ValueError naming the first bad material, triangle, text
         .def_property_readonly(
             "mesh", [](const Scene& scene) { return std::const_pointer_cast<Mesh>(scene.mesh); })
         .def_property_readonly("features", &features_of,
-                               "What the scene uses: dict of bool by name.");
+                               "What the scene uses: dict of bool by name.")
+        .def_property_readonly("bytes", &bytes_of,
+                               "Bytes held beside the mesh: dict by part, 0 where there is none.");
 }
 
 }  // namespace bvhlab

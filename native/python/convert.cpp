@@ -14,21 +14,22 @@ std::string shape_text(const py::array& array) {
     return text + ")";
 }
 
-FloatArray as_floats(const py::handle& argument, const char* name) {
+/// Not yet converted, so that its shape can be refused before anything is copied.
+py::array as_numbers(const py::handle& argument, const char* name) {
     const py::array array = py::array::ensure(argument);
     if (!array) throw py::value_error(std::string(name) + " must be an array of numbers");
     const char kind = array.dtype().kind();
     if (kind != 'f' && kind != 'i' && kind != 'u')
         throw py::value_error(std::string(name) + " must be an array of numbers, not of dtype " +
                               py::str(array.dtype()).cast<std::string>());
-    return FloatArray::ensure(array);
+    return array;
 }
 
 /// One value for all rays, or one a ray.
 FloatArray float_per_ray(const py::handle& argument, const char* name, py::ssize_t rays) {
-    const FloatArray array = as_floats(argument, name);
+    const py::array array = as_numbers(argument, name);
     if (array.ndim() == 0) return array.attr("reshape")(1).cast<FloatArray>();
-    if (array.ndim() == 1 && array.shape(0) == rays) return array;
+    if (array.ndim() == 1 && array.shape(0) == rays) return converted<FloatArray>(array);
     throw py::value_error(std::string(name) + " must be one number or of shape (" +
                           std::to_string(rays) + ",), not " + shape_text(array));
 }
@@ -54,13 +55,16 @@ void check_ray(std::size_t i, const Ray& ray) {
 
 FloatArray float_rows(const py::handle& argument, const char* name, py::ssize_t columns,
                       py::ssize_t rows) {
-    FloatArray array = as_floats(argument, name);
+    const py::array array = as_numbers(argument, name);
     if (array.ndim() != 2 || array.shape(1) != columns || (rows >= 0 && array.shape(0) != rows)) {
         const std::string wanted = rows >= 0 ? std::to_string(rows) : "N";
         throw py::value_error(std::string(name) + " must have shape (" + wanted + ", " +
                               std::to_string(columns) + "), not " + shape_text(array));
     }
-    return array;
+    if (array.shape(0) >= py::ssize_t(no_triangle))
+        throw py::value_error(std::string(name) + " has " + std::to_string(array.shape(0)) +
+                              " rows; a call takes at most 2^32 - 2");
+    return converted<FloatArray>(array);
 }
 
 std::span<const glm::vec3> as_vectors(const FloatArray& array) {
@@ -84,7 +88,6 @@ RayArguments::RayArguments(const py::handle& origins, const py::handle& directio
       t_min_(float_per_ray(t_min, "t_min", origins_.shape(0))),
       t_max_(float_per_ray(t_max, "t_max", origins_.shape(0))) {
     const RayBatch rays = batch();
-    if (rays.size() >= no_triangle) throw py::value_error("more than 2^32 - 2 rays in one call");
     for (std::size_t i = 0; i < rays.size(); ++i) check_ray(i, rays[i]);
 }
 

@@ -5,6 +5,7 @@
 #include <pybind11/pybind11.h>
 
 #include <memory>
+#include <new>
 #include <string>
 
 #include "base/token.h"
@@ -20,6 +21,15 @@ namespace py = pybind11;
 
 /// Float32 or float64 array of any shape, converted to contiguous float32 if it is not already.
 using FloatArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
+
+/// An array of numbers as an array of another type. Throws std::bad_alloc where that cannot be had:
+/// pybind11's own ensure() gives a null array then, which crashes whoever looks into it.
+template <class To>
+To converted(const py::array& numbers) {
+    To result = To::ensure(numbers);
+    if (!result) throw std::bad_alloc();
+    return result;
+}
 
 /// An array argument as contiguous float32 of shape (N, columns); N is free where `rows` is
 /// negative. Throws ValueError naming the argument for a non-numeric dtype or another shape.
@@ -66,7 +76,8 @@ struct PyBvh {
 /// What core.trace, core.brute_force and EmbreeScene.trace return (class `Hits` in Python).
 struct PyHits {
     py::object t, u, v, triangle, occluded, node_visits, box_tests, triangle_tests;
-    double key_seconds = 0, sort_seconds = 0, traverse_seconds = 0;
+    double key_seconds = 0, sort_seconds = 0, traverse_seconds = 0, prepare_seconds = 0;
+    std::size_t prepared_bytes = 0;
 };
 
 /// Hits as numpy arrays; the arrays that were not asked for are None.
@@ -88,6 +99,8 @@ PyHits to_python(HitsOf<Real>&& hits, bool any_hit, bool counted) {
     result.key_seconds = hits.key_seconds;
     result.sort_seconds = hits.sort_seconds;
     result.traverse_seconds = hits.traverse_seconds;
+    result.prepare_seconds = hits.prepare_seconds;
+    result.prepared_bytes = hits.prepared_bytes;
     return result;
 }
 
