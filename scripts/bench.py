@@ -3,8 +3,9 @@
 """`make bench`: builders and tracing against Embree and mathutils.bvhtree, on the same rays.
 
 Machines are shared and noisy, so every figure is a ratio to Embree within one round, the median
-over rounds with the quartiles; contenders take turns within a round. At the end comes what a
-feature of the renderer costs where no surface uses it (bench_features.py).
+over rounds with the quartiles; contenders take turns within a round. For the first scene the
+precision choices are compared (bench_precision.py). At the end comes what a feature of the renderer
+costs where no surface uses it (bench_features.py).
 """
 
 from __future__ import annotations
@@ -18,14 +19,17 @@ from typing import Any
 import bench_features
 import bpy
 import numpy as np
-from bench_build import bench_builds, ratio_text
+from bench_build import bench_builds
+from bench_precision import precision_lines
+from bench_ratios import ratio_text, speed_ratios
 from bvh_lab.native import core
 from bvh_lab.study.core_scene import core_scene
 from bvh_lab.study.load import load_mesh_file
 from bvh_lab.study.machine import describe_machine
 from bvh_lab.study.plan import BUILDERS, QUICK_PARAMS, Plan
+from bvh_lab.study.precision import LAYOUTS, width_text
 from bvh_lab.study.rays import choose_views, generate_rays
-from bvh_lab.study.results import KINDS, Result, Row
+from bvh_lab.study.results import KINDS, Result
 from bvh_lab.study.run import compare
 from bvh_lab.study.scene import Camera, Scene
 from bvh_lab.study.spreadsheet import rows_csv
@@ -76,18 +80,6 @@ def load_scene(path: Path) -> Scene:
 # --- tracing -------------------------------------------------------------------------------------
 
 
-def round_seconds(row: Row, kind: str) -> list[float]:
-    """Seconds of each round over all views."""
-    timed = [m for measured in row.of_kind(kind).values() for m in measured]
-    return [sum(seconds) for seconds in zip(*(m.seconds for m in timed), strict=True)]
-
-
-def speed_ratios(row: Row, rival: Row, kind: str) -> list[float]:
-    """Speed of ``row`` over that of ``rival``, round by round."""
-    pairs = zip(round_seconds(row, kind), round_seconds(rival, kind), strict=True)
-    return [theirs / ours for ours, theirs in pairs]
-
-
 def trace_lines(result: Result, slow: dict[str, float]) -> list[str]:
     """Lines of the table of tracing speeds, as ratios to robust and to fast Embree."""
     lines = [
@@ -104,7 +96,9 @@ def trace_lines(result: Result, slow: dict[str, float]) -> list[str]:
         if row.error:
             lines.append(f"{row.label:22s} failed: {row.error}")
             continue
-        name = f"{row.label} {row.branching}-wide" if row.branching else row.label
+        name = (
+            f"{row.label} {width_text(row.branching, row.layout)}" if row.branching else row.label
+        )
         cells = "".join(f"{ratio_text(speed_ratios(row, robust, kind)):>20s}" for kind in KINDS)
         errors = row.errors()
         counts = [
@@ -166,6 +160,7 @@ def bench(path: Path, out: Path, arguments: argparse.Namespace) -> None:
     plan.width, plan.height = arguments.resolution
     plan.repeats, plan.build_repeats, plan.pictures = arguments.repeats, 1, False
     plan.judged_rays, plan.reorders, plan.depth = 256, ["off"], 2
+    plan.layouts = list(LAYOUTS)
     large = len(scene.triangles) > 1_000_000
     machine = describe_machine(core, f"bpy {bpy.app.version_string}")
     lines = [
@@ -185,6 +180,10 @@ def bench(path: Path, out: Path, arguments: argparse.Namespace) -> None:
     result = compare(scene, plan).result
     traced = trace_lines(result, mathutils_speed(scene, plan))
     print("\n".join(traced), flush=True)
+    if arguments.precision and path == arguments.scenes[0]:
+        precise = ["", *precision_lines(scene, plan, out / f"{path.stem}_precision")]
+        print("\n".join(precise), flush=True)
+        traced += precise
     text = "\n".join([*lines, *traced]) + "\n"
     (out / f"{path.stem}.txt").write_text(text)
     (out / f"{path.stem}.csv").write_text(rows_csv(result))
@@ -200,6 +199,12 @@ def main() -> int:
     parser.add_argument("--builders", default=",".join(BUILDERS), help="e.g. lbvh,sbvh")
     parser.add_argument("--builds-only", action="store_true", help="trace nothing")
     parser.add_argument(
+        "--no-precision",
+        dest="precision",
+        action="store_false",
+        help="leave bench_precision.py out, which takes the first scene",
+    )
+    parser.add_argument(
         "--no-features", dest="features", action="store_false", help="leave bench_features.py out"
     )
     parser.add_argument("--repeats", type=int, default=7)
@@ -207,12 +212,12 @@ def main() -> int:
     arguments = parser.parse_args()
     arguments.builders = arguments.builders.split(",")
     arguments.resolution = [int(side) for side in arguments.resolution.split("x")]
-    scenes = arguments.scenes or [SHARED / "crytek_sponza.npz", SHARED / "crown.npz"]
-    missing = [str(path) for path in scenes if not path.is_file()]
+    arguments.scenes = arguments.scenes or [SHARED / "crytek_sponza.npz", SHARED / "crown.npz"]
+    missing = [str(path) for path in arguments.scenes if not path.is_file()]
     if missing:
         print(f"bench: error: there is no file {missing[0]}", file=sys.stderr)
         return 2
-    for path in scenes:
+    for path in arguments.scenes:
         bench(path, arguments.out, arguments)
     if arguments.features and not arguments.builds_only:
         print(flush=True)

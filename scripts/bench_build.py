@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from bench_ratios import ratio_text
 from bvh_lab.native import core
 from bvh_lab.study.load import load_mesh_file
 from bvh_lab.study.plan import Plan
@@ -18,12 +19,6 @@ from bvh_lab.study.results import spread
 BRANCHING = 8
 SLOW_SECONDS = 10.0  # a builder that takes longer is timed once, without a warm-up
 RIVALS = ("LBVH", "Embree low", "Embree high")  # what the ratios are of
-
-
-def ratio_text(ratios: list[float]) -> str:
-    """Median with quartiles."""
-    low, median, high = spread(ratios)
-    return f"{median:6.2f} [{low:.2f} {high:.2f}]"
 
 
 def bench_builds(path: Path, mesh: Any, plan: Plan, repeats: int) -> list[str]:

@@ -15,7 +15,6 @@ import math
 import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -183,7 +182,7 @@ def measure(
     row.seconds = tree.seconds
     row.steps, row.ended = list(tree.log["steps"]), tree.log["ended"]
     for branching in BRANCHINGS:
-        bvh = in_background(partial(tree.collapse, branching))
+        bvh = in_background(lambda token, k=branching: tree.collapse(k, token=token))
         row.cells[branching] = Cell(
             bvh.cost(),
             paper.get((row.builder, branching)),

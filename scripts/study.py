@@ -56,6 +56,7 @@ from bvh_lab.study.paper_tables import (
     tables_csv,
 )
 from bvh_lab.study.plan import QUICK_PARAMS, Plan
+from bvh_lab.study.precision import FULL
 from bvh_lab.study.rays import choose_views
 from bvh_lab.study.reference_picture import reference_picture
 from bvh_lab.study.report import write_report
@@ -196,17 +197,18 @@ def render_curves(
     labels = {builder["id"]: builder["label"] for builder in core.builders()}
     contestants = []
     for name in arguments.curves:
-        builder, branching = variant(name)
+        builder, branching, layout = variant(name)
         bvh = core.build(
             mesh,
             builder,
             branching=branching,
+            layout=layout,
             threads=plan.threads,
             params=plan.params.get(builder, {}),
         )
         curve = Curve(
             name,
-            f"{labels[builder]} {branching}-wide",
+            f"{labels[builder]} {branching}-wide{' compressed' if layout == 'cwbvh' else ''}",
             builder=builder,
             branching=branching,
         )
@@ -234,12 +236,13 @@ def render_curves(
     )
 
 
-def variant(name: str) -> tuple[str, int]:
-    """Builder and branching factor of a name like sbvh_8. Raises ValueError."""
-    builder, _, branching = name.rpartition("_")
+def variant(name: str) -> tuple[str, int, str]:
+    """Builder, branching factor and layout of a name like sbvh_8_cwbvh. Raises ValueError."""
+    layout = "cwbvh" if name.endswith("_8_cwbvh") else FULL
+    builder, _, branching = name.removesuffix("_cwbvh" if layout == "cwbvh" else "").rpartition("_")
     if branching not in ("2", "4", "8") or builder not in {b["id"] for b in core.builders()}:
-        raise ValueError(f"--curves takes variants like sbvh_8, not {name!r}")
-    return builder, int(branching)
+        raise ValueError(f"--curves takes variants like sbvh_8 and sbvh_8_cwbvh, not {name!r}")
+    return builder, int(branching), layout
 
 
 # --- what is written -----------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from typing import Any
 
 import bpy
 
+from ..study.precision import BOX_TESTS, LAYOUTS, TRIANGLE_TESTS
 from ..study.results import Row
 from ..study.table import failures
 from . import store, summary
@@ -22,7 +23,7 @@ HEADINGS = {
     "WRONG": "Wrong",
 }
 # The columns with their shares of the width: all, or those for which a narrow panel has room.
-WIDE = {"NAME": 0.27, "BUILD": 0.16, "COST": 0.15, "SPEED": 0.16, "RATIO": 0.13, "WRONG": 0.13}
+WIDE = {"NAME": 0.34, "BUILD": 0.14, "COST": 0.13, "SPEED": 0.17, "RATIO": 0.11, "WRONG": 0.11}
 NARROW = {"NAME": 0.40, "BUILD": 0.22, "SPEED": 0.22, "WRONG": 0.16}
 NARROW_PIXELS = 400  # width of the region, at interface scale 1, below which a panel is narrow
 
@@ -56,15 +57,19 @@ class BVHLAB_PT_compare(RenderPanel, bpy.types.Panel):
 
 
 def _draw_switches(
-    layout: bpy.types.UILayout, label: str, settings: bpy.types.PropertyGroup, names: Sequence[str]
+    layout: bpy.types.UILayout,
+    label: str,
+    settings: bpy.types.PropertyGroup,
+    names: Sequence[str],
+    columns: int = 3,
 ) -> None:
-    """Switches behind a label, three to a row, which a click toggles one by one."""
+    """Switches behind a label, so many to a row, which a click toggles one by one."""
     split = layout.split(factor=0.4)
     split.use_property_split = False
     heading = split.row()
     heading.alignment = "RIGHT"
     heading.label(text=label)
-    grid = split.grid_flow(row_major=True, columns=3, even_columns=True, align=True)
+    grid = split.grid_flow(row_major=True, columns=columns, even_columns=True, align=True)
     for name in names:
         if hasattr(settings, name):
             grid.prop(settings, name, toggle=True)
@@ -138,6 +143,29 @@ class BVHLAB_PT_settings(RenderPanel, bpy.types.Panel):
         target.prop(settings, "target_error")
 
 
+class BVHLAB_PT_advanced(RenderPanel, bpy.types.Panel):
+    bl_label = "Advanced"
+    bl_parent_id = "BVHLAB_PT_settings"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, settings = self.layout, context.scene.bvh_lab
+        layout.enabled = store.running is None
+        if settings.preset == "paper":
+            sentence = "Preset Paper has full nodes only, and the exact tests"
+            paragraph(layout, context, sentence, icon="INFO")
+            return
+        for label, group, names in (
+            ("Nodes", "layout", LAYOUTS),
+            ("Triangle Test", "triangle", TRIANGLE_TESTS),
+            ("Box Test", "box", BOX_TESTS),
+        ):
+            _draw_switches(layout, label, settings, [f"{group}_{name}" for name in names], 2)
+        if not settings.plan().all_exact():
+            sentence = "Other tests are there to be compared: they may be wrong, and render nothing"
+            paragraph(layout, context, sentence, icon="INFO")
+
+
 class BVHLAB_UL_variants(bpy.types.UIList):
     """The table: numbers from the store, sorted by the column that was clicked."""
 
@@ -157,7 +185,7 @@ class BVHLAB_UL_variants(bpy.types.UIList):
             return
         best = summary.fastest(rows, data.kind)
         texts = summary.cells(row, data.kind, summary.baseline(rows, data.baseline))
-        layout.alert = bool(row.error) or row.disagrees() or row.errors().wrong > 0
+        layout.alert = summary.has_errors(row) or row.disagrees()
         for column, cell in _cells(layout, _columns(context)):
             if column == "NAME":
                 icon = "ERROR" if layout.alert else "SOLO_ON" if row is best else "BLANK1"
@@ -324,6 +352,7 @@ CLASSES = (
     BVHLAB_UL_variants,
     BVHLAB_PT_compare,
     BVHLAB_PT_settings,
+    BVHLAB_PT_advanced,
     BVHLAB_PT_results,
     BVHLAB_PT_details,
     BVHLAB_PT_notes,

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Iterable
 
 import bpy
 from bpy.props import (
@@ -18,6 +19,7 @@ from bpy.props import (
 
 from ..native import load
 from ..study.plan import BRANCHINGS, QUICK_ITERATIONS, Plan
+from ..study.precision import BOX_TESTS, LAYOUTS, TRIANGLE_TESTS
 from . import preferences, store
 
 QUICK = Plan()
@@ -129,6 +131,52 @@ class BVHLAB_PG_settings(bpy.types.PropertyGroup):
             ("octahedron", "Origin, then Direction", "Direction as a point of an octahedron", 2),
             ("two_point", "Both Ends", "Where rays start, and where they may end", 3),
         ],
+    )
+    layout_full: BoolProperty(
+        name="Full",
+        description="Keep boxes in full precision, the usual way",
+        default=True,
+    )
+    layout_cwbvh: BoolProperty(
+        name="Compressed",
+        description="Keep every BVH of branching factor 8 a second time in less memory, its boxes "
+        "rounded outwards: the same hits, shown as 8c",
+        default=True,
+    )
+    triangle_watertight: BoolProperty(
+        name="Watertight",
+        description="Exact, and the same from every BVH: no ray slips through a closed surface. "
+        "Pictures are rendered with this test only",
+        default=True,
+    )
+    triangle_moller_trumbore: BoolProperty(
+        name="Möller-Trumbore",
+        description="The best known test. May lose rays at edges and far from the origin; how many "
+        "is shown",
+        default=False,
+    )
+    triangle_woop_affine: BoolProperty(
+        name="Woop Affine",
+        description="The test of the paper: prepares each triangle, which takes memory. May lose "
+        "rays at edges; how many is shown",
+        default=False,
+    )
+    triangle_baldwin_weber: BoolProperty(
+        name="Baldwin-Weber",
+        description="Prepares each triangle to have little left to do. May lose rays at edges; how "
+        "many is shown",
+        default=False,
+    )
+    box_conservative: BoolProperty(
+        name="Conservative",
+        description="Boxes a little too large rather than too small: no hit is lost. Pictures are "
+        "rendered with this test only",
+        default=True,
+    )
+    box_plain: BoolProperty(
+        name="Plain",
+        description="Boxes without the margin for rounding. May lose hits; how many is shown",
+        default=False,
     )
     device: EnumProperty(name="Device", description="What builds and traces", items=_device_items)
     geometry: EnumProperty(
@@ -259,6 +307,9 @@ class BVHLAB_PG_settings(bpy.types.PropertyGroup):
             plan.depth, plan.ray_long_side = self.depth, self.ray_resolution
             for params in plan.params.values():
                 params["iterations"] = self.annealing
+            plan.layouts = self._switched_on("layout", LAYOUTS)
+            plan.triangle_tests = self._switched_on("triangle", TRIANGLE_TESTS)
+            plan.box_tests = self._switched_on("box", BOX_TESTS)
         plan.repeats, plan.judged_rays = self.repeats, self.judged_rays
         plan.embree, plan.pictures = self.embree, self.pictures
         if self.pictures:  # what is judged
@@ -267,7 +318,10 @@ class BVHLAB_PG_settings(bpy.types.PropertyGroup):
 
     def variants(self) -> int:
         """How many variants the settings ask for."""
-        return len(self.builders()) * len(self.branchings()) * (2 if self.use_reordering else 1)
+        return len(self.plan().variants())
+
+    def _switched_on(self, group: str, names: Iterable[str]) -> list[str]:
+        return [name for name in names if getattr(self, f"{group}_{name}")]
 
 
 class BVHLAB_PG_row(bpy.types.PropertyGroup):

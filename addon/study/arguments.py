@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Iterable
 
-from .plan import PRESETS, REORDERS, Plan
+from .plan import BRANCHINGS, BUILDERS, PRESETS, REORDERS, Plan
+from .precision import BOX_TESTS, LAYOUTS, TRIANGLE_TESTS
 
 NUMBERS = (
     *("samples", "depth", "shadow_rays", "ray_long_side"),
@@ -22,12 +24,29 @@ def add_plan_arguments(parser: argparse.ArgumentParser) -> None:
     plan = Plan()
     add = parser.add_argument
     add("--preset", choices=PRESETS, default="quick", help="where all other choices start")
-    add("--builders", metavar="A,B", help=f"e.g. lbvh,sah (default: {','.join(plan.builders)})")
+    add("--builders", metavar="A,B", help=f"of {','.join(plan.builders)} (default: all)")
     add("--branching", metavar="2,4,8", help="branching factors (default: all)")
     add(
         "--reorder",
         metavar="A,B",
         help=f"sort rays before they are traced: {','.join(REORDERS)} (default: off)",
+    )
+    add(
+        "--layouts",
+        metavar="A,B",
+        help=f"how nodes are stored: {','.join(LAYOUTS)}; cwbvh is 8-wide only (default: all, "
+        "preset paper: full)",
+    )
+    add(
+        "--triangle-tests",
+        metavar="A,B",
+        help=f"all, or of {','.join(TRIANGLE_TESTS)}: all but the first may miss or hit wrongly "
+        "(default: watertight)",
+    )
+    add(
+        "--box-tests",
+        metavar="A,B",
+        help=f"all, or of {','.join(BOX_TESTS)}: plain may miss (default: conservative)",
     )
     add("--device", metavar="A,B", help="see the command devices (default: cpu)")
     add(
@@ -100,13 +119,20 @@ def plan_from_arguments(arguments: argparse.Namespace) -> Plan:
     if arguments.memory is not None:
         plan.memory_gib = arguments.memory
     if arguments.builders is not None:
-        plan.builders = _words(arguments.builders)
+        plan.builders = _choices(arguments.builders, BUILDERS)
     if arguments.device is not None:
         plan.devices = _words(arguments.device)
     if arguments.branching is not None:
-        plan.branchings = [_integer("--branching", word) for word in _words(arguments.branching)]
+        words = _choices(arguments.branching, [str(branching) for branching in BRANCHINGS])
+        plan.branchings = [_integer("--branching", word) for word in words]
     if arguments.reorder is not None:
-        plan.reorders = _words(arguments.reorder)
+        plan.reorders = _choices(arguments.reorder, REORDERS)
+    if arguments.layouts is not None:
+        plan.layouts = _choices(arguments.layouts, LAYOUTS)
+    if arguments.triangle_tests is not None:
+        plan.triangle_tests = _choices(arguments.triangle_tests, TRIANGLE_TESTS)
+    if arguments.box_tests is not None:
+        plan.box_tests = _choices(arguments.box_tests, BOX_TESTS)
     if arguments.views is not None:
         words = _words(arguments.views)
         counted = len(words) == 1 and words[0].isdecimal()
@@ -122,6 +148,12 @@ def plan_from_arguments(arguments: argparse.Namespace) -> Plan:
 
 def _words(text: str) -> list[str]:
     return [word.strip() for word in text.split(",") if word.strip()]
+
+
+def _choices(text: str, known: Iterable[str]) -> list[str]:
+    """The words, or all that are known for the word "all"."""
+    words = _words(text)
+    return list(known) if words == ["all"] else words
 
 
 def _integer(option: str, word: str) -> int:

@@ -12,6 +12,7 @@ import numpy as np
 
 from .correlation import correlate
 from .paper_tables import BASELINE, Measured
+from .precision import FULL
 from .results import KINDS
 
 
@@ -36,15 +37,17 @@ class ScenePoint:
 def cost_points(measured: Measured) -> list[ScenePoint]:
     """A point for each scene, tree, kind and order of rays that LBVH was measured for, too.
 
-    The paper shows those of binary BVHs, and no primary rays.
+    The paper shows those of binary BVHs, and no primary rays. Compressed nodes are left out: their
+    cost counts boxes that are larger than the tree's.
     """
+    traces = [t for t in measured.traces if t.layout == FULL]
     bases = {
         (t.scene, t.view, t.branching, t.reordered, t.kind): t
-        for t in measured.traces
+        for t in traces
         if t.builder == BASELINE
     }
     ratios: dict[tuple[str, str, bool, str, int], list[tuple[float, float]]] = {}
-    for t in measured.traces:
+    for t in traces:
         if base := bases.get((t.scene, t.view, t.branching, t.reordered, t.kind)):
             place = (t.scene, t.kind, t.reordered, t.builder, t.branching)
             ratios.setdefault(place, []).append((t.cost / base.cost, base.mrays / t.mrays))

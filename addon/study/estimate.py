@@ -15,7 +15,7 @@ from .rays import View, most_rays
 from .results import KINDS, Row
 from .target_error import guessed_samples
 
-# One binary tree and its collapse to three branching factors, on two cores.
+# One binary tree and its collapse to three branching factors in full, on two cores.
 BUILD_SECONDS_PER_MILLION = {
     "lbvh": 1.0,
     "hlbvh": 1.1,
@@ -31,6 +31,7 @@ BUILD_SECONDS_PER_MILLION = {
     "hybrid": 15.0,
     "embree": 1.5,
 }
+COMPRESS_SECONDS_PER_MILLION = 0.9  # the collapse to compressed nodes on top
 TRACE_SECONDS_PER_MILLION = 0.5
 SHADING = 1.5  # what a picture takes, in times of tracing its rays
 JUDGE_SECONDS_PER_TEST = 6e-9  # one brute-force ray against one triangle on one core
@@ -46,7 +47,10 @@ class Estimate:
 
     def build(self, builder: str) -> float:
         """One build; ``builder`` may be "embree"."""
-        return 1e-6 * self.triangles * BUILD_SECONDS_PER_MILLION.get(builder, 5.0)
+        seconds = BUILD_SECONDS_PER_MILLION.get(builder, 5.0)
+        if builder != "embree" and "cwbvh" in self.plan.layouts:
+            seconds += COMPRESS_SECONDS_PER_MILLION
+        return 1e-6 * self.triangles * seconds
 
     def trace(self, rays: int) -> float:
         """Rays traced once."""
@@ -73,7 +77,7 @@ class Estimate:
         """Everything that one built row takes, per category, in all views or these."""
         ours = row.system == "bvh_lab"
         runs = self.plan.repeats + (2 if ours else 1)  # warm-up, and counters for ours
-        pictures = 1 if ours and self.plan.pictures else 0
+        pictures = 1 if row.exact and self.plan.pictures else 0
         once = [self.view(view) for view in views or self.views]
         return {
             "trace": runs * sum(part["trace"] for part in once),

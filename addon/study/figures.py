@@ -33,6 +33,7 @@ from .figure_style import (
 )
 from .image_error import TARGET, Curve
 from .paper_tables import BASELINE, Measured
+from .precision import FULL
 from .scene import Float32Array
 
 __all__ = [
@@ -150,13 +151,13 @@ class BuildPoint:
 
 
 def build_points(measured: Measured, kind: str) -> list[BuildPoint]:
-    """Of all trees that were timed beside LBVH, rays in the order that they come."""
+    """Of all trees with full nodes that were timed beside LBVH, rays in the order they come."""
     base_builds = {b.scene: b.seconds for b in measured.builds if b.builder == BASELINE}
     builds: dict[str, list[float]] = {}
     for b in measured.builds:
         if base_builds.get(b.scene):
             builds.setdefault(b.builder, []).append(b.seconds / base_builds[b.scene])
-    traces = [t for t in measured.traces if t.kind == kind and not t.reordered]
+    traces = [t for t in measured.traces if t.kind == kind and t.layout == FULL and not t.reordered]
     bases = {
         (t.scene, t.view): t.mrays for t in traces if (t.builder, t.branching) == (BASELINE, 2)
     }

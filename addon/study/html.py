@@ -8,8 +8,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
+from .method import method
 from .results import KINDS, Result, Row
-from .table import Column, columns, failures, fastest, header, method, picture_quality
+from .table import Column, columns, failures, fastest, header, picture_quality
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #1c2024; --soft: #60646c; --paper: #fcfcfd;
@@ -44,11 +45,13 @@ def html_page(
     files: Mapping[tuple[str, str], str],
     folder: Path,
     curves: Path | str = "",
+    precision: Path | str = "",
 ) -> str:
     """The page. ``files`` names the PNG, relative to ``folder``, of each (variant, view) as
     `report.write_pictures` returns them; the ones shown are copied into the page.
 
-    ``curves`` is the PNG of error against time, or says why there is none.
+    ``curves`` is the PNG of error against time, or says why there is none; ``precision`` that of
+    speed against error.
     """
     name = escape(result.subject.name)
     failed = "".join(f'<p class="bad">{escape(line)}</p>' for line in failures(result))
@@ -71,6 +74,7 @@ def html_page(
 <h2>All variants</h2>
 {_table(result.rows)}
 {_pictures(result, files, folder)}
+{_precision_figure(precision)}
 {_error_curves(result, curves)}
 <h2>How it was measured</h2>
 {_list(method(result.plan))}
@@ -93,7 +97,7 @@ def _list(lines: Iterable[str]) -> str:
 
 
 def _table(rows: Sequence[Row]) -> str:
-    chosen = columns(rows)
+    chosen = columns(rows, detailed=True)
     heads = "".join(
         f"<th{_side(column)}>{escape(column.title)}<small>{escape(column.unit)}</small></th>"
         for column in chosen
@@ -112,6 +116,8 @@ def _line(row: Row, rows: Sequence[Row], chosen: Sequence[Column]) -> str:
         share = _share(row, rows, column)
         if share is not None:
             attributes = f' class="bar" style="--share: {100.0 * share:.1f}%"'
+        elif column.title == "wrong" and row.errors().wrong:
+            attributes = ' class="bad"'
         cells.append(f"<td{attributes}>{escape(column.cell(row))}</td>")
     rival = "" if row.system == "bvh_lab" else ' class="rival"'
     return f"<tr{rival}>{''.join(cells)}</tr>"
@@ -153,6 +159,22 @@ def _pictures(result: Result, files: Mapping[tuple[str, str], str], folder: Path
     if not figures:
         return ""
     return f'<h2>Pictures</h2>\n<div class="pictures">\n{"".join(figures)}</div>'
+
+
+def _precision_figure(precision: Path | str) -> str:
+    if not precision:
+        return ""
+    if isinstance(precision, str):
+        shown = _paragraphs([precision], "soft")
+    else:
+        caption = (
+            "Precision choices against the default one of the same tree. Dots: speed, geometric "
+            "mean over trees and kinds of ray; bars: least to most. Left: answers otherwise than "
+            "the default's over all rays, exact ties apart. Right: error of t in units in the "
+            "last place of float32 where the triangle is right, from median to largest"
+        )
+        shown = _figure(precision, caption)
+    return f"<h2>Speed against error</h2>\n{shown}"
 
 
 def _error_curves(result: Result, curves: Path | str) -> str:

@@ -5,16 +5,16 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from .results import Errors
+from .accuracy import Errors
 from .scene import Float32Array, Float64Array, UInt32Array
 
 BoolArray = npt.NDArray[np.bool_]
-TIE_ULPS = 4.0  # float32 units in the last place within which two distances are a tie
 
 
 @dataclass
@@ -77,15 +77,32 @@ def picture_difference(pixels: Float32Array, reference: Float32Array) -> Float32
 
 
 @dataclass
+class Deviations:
+    """How far the hits on the right triangle are from the exact ones, one entry a hit.
+
+    ``t_ulps`` is |t - exact t| in units in the last place of the exact t as a float32, ``uv`` the
+    larger of |u - exact u| and |v - exact v|. Both float64, finite.
+    """
+
+    t_ulps: Float64Array
+    uv: Float64Array
+
+    @classmethod
+    def none(cls) -> Deviations:
+        """Of no hits."""
+        return cls(np.empty(0), np.empty(0))
+
+
+@dataclass
 class Judge:
     """Compares answers with those of a judge, forgiving exact ties.
 
-    ``vertices`` and ``triangles`` are the mesh, ``origins`` and ``directions`` (N, 3) the judged
-    rays, ``truth`` the judge's answers to them.
+    ``mesh`` is a `core.Mesh`, ``origins`` and ``directions`` (N, 3) are the judged rays, ``truth``
+    the judge's answers to them.
     """
 
-    vertices: Float32Array
-    triangles: UInt32Array
+    core: ModuleType
+    mesh: Any
     origins: Float32Array
     directions: Float32Array
     truth: Answers
@@ -93,44 +110,50 @@ class Judge:
     def errors(self, answers: Answers) -> Errors:
         """Count the wrong answers (see `Errors`)."""
         hit, should_hit = answers.occluded, self.truth.occluded
-        errors = Errors(
+        return Errors(
             judged=len(hit),
             false_misses=int((~hit & should_hit).sum()),
             false_hits=int((hit & ~should_hit).sum()),
+            wrong_triangles=int((hit & should_hit & ~self._right(answers)).sum()),
         )
-        if answers.t is None or answers.triangle is None:
-            return errors
-        assert self.truth.t is not None and self.truth.triangle is not None
-        same = answers.triangle == self.truth.triangle
-        both = np.flatnonzero(hit & should_hit & same)
-        if len(both):
-            true_t = self.truth.t[both].astype(np.float64)
-            relative = np.abs(answers.t[both] - true_t) / np.maximum(
-                true_t, np.finfo(np.float32).tiny
-            )
-            errors.largest_t_error = float(relative.max())
-        other = np.flatnonzero(hit & should_hit & ~same)
-        errors.wrong_triangles = int((~self._tied(other, answers)).sum())
-        return errors
 
-    def _tied(self, rays: npt.NDArray[np.intp], answers: Answers) -> BoolArray:
-        """Whether these rays met another triangle at the judge's distance.
+    def deviations(self, answers: Answers) -> Deviations:
+        """How exact the right hits are; none where only occlusion was asked for.
 
-        The distance to the triangle that was answered is computed in double here: the rounding of
-        the answer's own float32 distance grows with the triangle, not with the distance.
+        Each is held against the exact crossing of the triangle that was answered.
         """
-        assert answers.t is not None and answers.triangle is not None and self.truth.t is not None
-        true_t = self.truth.t[rays].astype(np.float64)
-        exact_t = self._plane_distance(rays, answers.triangle[rays])
-        off = np.minimum(np.abs(exact_t - true_t), np.abs(answers.t[rays] - true_t))
-        tolerance = TIE_ULPS * np.spacing(true_t.astype(np.float32)).astype(np.float64)
-        return np.asarray(off <= tolerance, dtype=np.bool_)
+        if answers.t is None or answers.u is None or answers.v is None or answers.triangle is None:
+            return Deviations.none()
+        rays = np.flatnonzero(answers.occluded & self.truth.occluded & self._right(answers))
+        if not len(rays):
+            return Deviations.none()
+        exact = self.core.crossing(
+            self.mesh, self.origins[rays], self.directions[rays], answers.triangle[rays]
+        )
+        with np.errstate(over="ignore", invalid="ignore"):
+            ulp = np.spacing(np.abs(exact.t).astype(np.float32)).astype(np.float64)
+            t_ulps = np.abs(answers.t[rays] - exact.t) / ulp
+            uv = np.maximum(np.abs(answers.u[rays] - exact.u), np.abs(answers.v[rays] - exact.v))
+        return Deviations(_finite(t_ulps), _finite(uv))
 
-    def _plane_distance(self, rays: npt.NDArray[np.intp], triangle: UInt32Array) -> Float64Array:
-        a, b, c = (self.vertices[self.triangles[triangle, i]].astype(np.float64) for i in range(3))
-        normal = np.cross(b - a, c - a)
-        origin = self.origins[rays].astype(np.float64)
-        direction = self.directions[rays].astype(np.float64)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            distance = ((a - origin) * normal).sum(axis=1) / (direction * normal).sum(axis=1)
-        return np.where(np.isfinite(distance), distance, np.inf)
+    def _right(self, answers: Answers) -> BoolArray:
+        """Which hits are on the judge's triangle, or tied with it; of no meaning for misses."""
+        if answers.triangle is None or self.truth.triangle is None:
+            return np.ones(len(answers.occluded), dtype=np.bool_)
+        right: BoolArray = answers.triangle == self.truth.triangle
+        other = np.flatnonzero(answers.occluded & self.truth.occluded & ~right)
+        if len(other):
+            right[other] = self.core.exact_tie(
+                self.mesh,
+                self.origins[other],
+                self.directions[other],
+                answers.triangle[other],
+                self.truth.triangle[other],
+            )
+        return right
+
+
+def _finite(values: Float64Array) -> Float64Array:
+    """NaN and infinities as the largest number: JSON has neither, and an error they are."""
+    largest = float(np.finfo(np.float64).max)
+    return np.nan_to_num(values, nan=largest, posinf=largest)

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
+import math
 import zipfile
-import zlib
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,9 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from .framing import auto_cameras
+from .machine import free_bytes
 from .scene import Material, Scene, World
 
 SUFFIXES = (".npz", ".obj", ".ply")
+LARGEST_COORDINATE = 1e37  # that core.Mesh takes
 
 
 class LoadError(ValueError):
@@ -38,7 +40,10 @@ def load_mesh_file(path: Path, up: Literal["y", "z"] = "z") -> Scene:
         f"white world, {up.upper()} up, and all of it is grey.",
     ]
     _check(path, vertices, triangles)
-    given, vertices = vertices, vertices.astype(np.float32)
+    given = vertices
+    with np.errstate(over="ignore"):
+        vertices = vertices.astype(np.float32)
+    _check_size(path, vertices)
     if (vertices != given).any():
         notes.append(f"Vertices were rounded from {given.dtype} to float32.")
     return Scene(
@@ -58,15 +63,47 @@ def load_mesh_file(path: Path, up: Literal["y", "z"] = "z") -> Scene:
 
 def _read_npz(path: Path) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     try:
+        _check_promises(path)
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in ("vertices", "triangles") if name in file}
             there = ", ".join(file) or "none"
-    except (OSError, ValueError, EOFError, AttributeError, zipfile.BadZipFile, zlib.error) as error:
-        raise LoadError(f"{path} is not a readable .npz file: {error}") from error
+    except LoadError:
+        raise
+    except Exception as error:  # whatever a broken file makes zipfile and numpy raise
+        raise _unreadable(path, error) from error
     for name in ("vertices", "triangles"):
         if name not in arrays:
             raise LoadError(f"{path} has no array {name!r}; its arrays: {there}")
     return arrays["vertices"], arrays["triangles"]
+
+
+def _check_promises(path: Path) -> None:
+    """Refuse arrays that promise more than the file holds, or than fits in memory.
+
+    numpy makes room for the whole array before it reads the first number.
+    """
+    npy: Any = np.lib.format  # its functions have no types
+    with zipfile.ZipFile(path) as archive:
+        for member in archive.infolist():
+            if member.filename not in ("vertices.npy", "triangles.npy"):
+                continue
+            with archive.open(member) as file:
+                version = npy.read_magic(file)
+                if version == (1, 0):
+                    shape, _, dtype = npy.read_array_header_1_0(file)
+                else:
+                    shape, _, dtype = npy.read_array_header_2_0(file)
+                held = member.file_size - file.tell()
+            name = member.filename.removesuffix(".npy")
+            if not dtype.hasobject and math.prod(shape) * dtype.itemsize > held:
+                raise LoadError(f"{path}: {name} has shape {shape}, but the file ends before that")
+            if held > free_bytes():
+                raise LoadError(f"{path}: {name} needs {held / 2**30:.1f} GiB, more than is free")
+
+
+def _unreadable(path: Path, error: Exception) -> LoadError:
+    lines = str(error).splitlines() or [type(error).__name__]
+    return LoadError(f"{path} is not a readable {path.suffix} file: {lines[0][:300]}")
 
 
 def _read_with_trimesh(path: Path) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
@@ -79,8 +116,7 @@ def _read_with_trimesh(path: Path) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     try:
         mesh: Any = trimesh.load_mesh(path, process=False, skip_materials=True)
     except Exception as error:  # whatever a broken file makes trimesh raise
-        reason = str(error) or type(error).__name__
-        raise LoadError(f"{path} is not a readable {path.suffix} file: {reason}") from error
+        raise _unreadable(path, error) from error
     faces = getattr(mesh, "faces", None)
     if faces is None or len(faces) == 0:
         raise LoadError(f"{path} has no triangles")
@@ -105,4 +141,14 @@ def _check(path: Path, vertices: npt.NDArray[Any], triangles: npt.NDArray[Any]) 
         raise LoadError(
             f"{path}: triangle {out[0]} is {triangles[out[0]].tolist()}, but vertices go from 0 to "
             f"{len(vertices) - 1}"
+        )
+
+
+def _check_size(path: Path, vertices: npt.NDArray[np.float32]) -> None:
+    """Name the first vertex that is too far out, once rounded."""
+    far = np.flatnonzero(~(np.abs(vertices) <= np.float32(LARGEST_COORDINATE)).all(axis=1))
+    if len(far):
+        raise LoadError(
+            f"{path}: vertex {far[0]} is {vertices[far[0]].tolist()}: coordinates must be at most "
+            f"{LARGEST_COORDINATE:g} in size"
         )

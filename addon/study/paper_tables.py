@@ -3,6 +3,10 @@
 
 Every relative number is taken within one scene and view and then averaged, arithmetic mean, over
 scenes and views. Where LBVH, which all is relative to, was not measured, cells stay empty.
+
+Compressed nodes of eight children (cwbvh), which the paper does not have, are a further width
+beside 2, 4 and 8, "8c", with a table of their own after the octal one. Rows traced with other than
+the default tests are left out: all that the tables compare has the same hits.
 """
 
 from __future__ import annotations
@@ -14,11 +18,17 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from .plan import BRANCHINGS, BUILDERS
+from .precision import CWBVH_BRANCHING, FULL, width_text
 from .results import KINDS, Result, spread
 
 BASELINE = "lbvh"
 PAPER_KINDS = ("secondary", "shadow")  # the paper's tables and figure leave primary rays out
-WIDTHS = {2: "binary", 4: "quaternary", 8: "octal"}
+Shape = tuple[int, str]  # branching factor and layout
+CWBVH: Shape = (CWBVH_BRANCHING, "cwbvh")
+WIDTHS: dict[Shape, str] = {
+    **dict(zip(((b, FULL) for b in BRANCHINGS), ("binary", "quaternary", "octal"), strict=True)),
+    CWBVH: "octal compressed",
+}
 
 
 @dataclass(frozen=True)
@@ -38,6 +48,7 @@ class Trace:
     cost: float
     mrays: float
     spread_percent: float = 0.0
+    layout: str = FULL
 
 
 @dataclass(frozen=True)
@@ -92,6 +103,7 @@ class Line:
     branching: int
     statistic: str
     cells: dict[str, Cell] = field(default_factory=dict)
+    layout: str = FULL
 
 
 @dataclass
@@ -101,6 +113,12 @@ class Table:
     number: int
     caption: str
     lines: list[Line]
+    suffix: str = ""
+
+    @property
+    def name(self) -> str:
+        """Its number, with a letter where the paper has no such table."""
+        return f"{self.number}{self.suffix}"
 
 
 def measured_by(results: Sequence[Result], reorder: str = "aila") -> Measured:
@@ -115,7 +133,7 @@ def measured_by(results: Sequence[Result], reorder: str = "aila") -> Measured:
     made = Measured([], [], {})
     for result in results:
         for row in result.rows:
-            if row.system != "bvh_lab" or row.error or row.tree is None:
+            if not row.exact or row.error or row.tree is None:
                 continue
             made.labels[row.builder] = row.label
             if row.branching == 2 and row.reorder == "off" and (build := row.build()):
@@ -137,6 +155,7 @@ def measured_by(results: Sequence[Result], reorder: str = "aila") -> Measured:
                         row.tree.cost,
                         speed.median,
                         speed.half_percent,
+                        row.layout,
                     )
                     for view, speed in row.view_speeds(kind).items()
                 ]
@@ -146,7 +165,7 @@ def measured_by(results: Sequence[Result], reorder: str = "aila") -> Measured:
 def paper_tables(measured: Measured) -> list[Table]:
     """Tables 1 to 6, in that order, those that the measurements can fill."""
     tables = [_relative_speeds(measured), _build_times(measured)]
-    tables += [_cost_and_speed(measured, branching) for branching in BRANCHINGS]
+    tables += [_cost_and_speed(measured, shape) for shape in WIDTHS]
     tables.append(_time_by_cost(measured))
     return [table for table in tables if any(line.cells for line in table.lines)]
 
@@ -162,8 +181,11 @@ def _select(traces: Iterable[Trace], **wanted: object) -> list[Trace]:
 Place = tuple[str, str, str]  # scene, view, kind
 
 
-def _baselines(measured: Measured, branching: int, reordered: bool = False) -> dict[Place, Trace]:
-    traces = _select(measured.traces, builder=BASELINE, branching=branching, reordered=reordered)
+def _baselines(measured: Measured, shape: Shape) -> dict[Place, Trace]:
+    branching, layout = shape
+    traces = _select(
+        measured.traces, builder=BASELINE, branching=branching, layout=layout, reordered=False
+    )
     return {(t.scene, t.view, t.kind): t for t in traces}
 
 
@@ -179,21 +201,23 @@ def _mean(
 
 def _lines(
     measured: Measured,
-    branching: int,
+    shape: Shape,
     reordered: Sequence[bool],
     baselines: Mapping[Place, Trace],
     ratio: Callable[[Trace, Trace], float],
 ) -> list[Line]:
     """A line of means for each kind of ray."""
+    branching, layout = shape
     lines = []
     for sorting in reordered:
         for kind in PAPER_KINDS:
-            line = Line("", branching, _statistic(kind, sorting))
+            line = Line("", branching, _statistic(kind, sorting), layout=layout)
             for builder in measured.builders:
                 of = _select(
                     measured.traces,
                     builder=builder,
                     branching=branching,
+                    layout=layout,
                     reordered=sorting,
                     kind=kind,
                 )
@@ -204,7 +228,7 @@ def _lines(
 
 
 def _relative_speeds(measured: Measured) -> Table:
-    binary = _baselines(measured, 2)
+    binary = _baselines(measured, (2, FULL))
     caption = (
         "Ray tracing speed relative to the binary LBVH without reordering; mean over scenes and "
         "views."
@@ -212,9 +236,9 @@ def _relative_speeds(measured: Measured) -> Table:
     lines = [
         line
         for reordered in (False, True)
-        for branching in BRANCHINGS
+        for shape in WIDTHS
         for line in _lines(
-            measured, branching, (reordered,), binary, lambda t, base: t.mrays / base.mrays
+            measured, shape, (reordered,), binary, lambda t, base: t.mrays / base.mrays
         )
     ]
     return Table(1, caption, lines)
@@ -242,12 +266,13 @@ def _build_times(measured: Measured) -> Table:
     return Table(2, "Build times of binary BVHs in milliseconds.", [*lines, mean])
 
 
-def _cost_and_speed(measured: Measured, branching: int) -> Table:
+def _cost_and_speed(measured: Measured, shape: Shape) -> Table:
     """Table 3, 4 or 5: costs and MRays/s of each scene; relative to LBVH without reordering."""
+    branching, layout = shape
     lines = []
     for scene in measured.scenes:
-        of_scene = _select(measured.traces, scene=scene, branching=branching)
-        cost = Line(scene, branching, "BVH cost")
+        of_scene = _select(measured.traces, scene=scene, branching=branching, layout=layout)
+        cost = Line(scene, branching, "BVH cost", layout=layout)
         costs = {t.builder: t.cost for t in of_scene}
         for builder in (b for b in measured.builders if b in costs):
             base = costs.get(BASELINE)
@@ -255,8 +280,8 @@ def _cost_and_speed(measured: Measured, branching: int) -> Table:
         lines.append(cost)
         for reordered in (False, True):
             lines += [_speed_line(measured, of_scene, kind, reordered) for kind in PAPER_KINDS]
-    caption = f"BVH cost and trace speed in MRays/s (mean over views), {WIDTHS[branching]} BVHs."
-    return Table(branching.bit_length() + 1, caption, lines)
+    caption = f"BVH cost and trace speed in MRays/s (mean over views), {WIDTHS[shape]} BVHs."
+    return Table(branching.bit_length() + 1, caption, lines, "c" if shape == CWBVH else "")
 
 
 def _speed_line(measured: Measured, of_scene: Sequence[Trace], kind: str, reordered: bool) -> Line:
@@ -270,6 +295,7 @@ def _speed_line(measured: Measured, of_scene: Sequence[Trace], kind: str, reorde
         if (speed := mean(traces)) is None:
             continue
         line.scene, line.branching = traces[0].scene, traces[0].branching
+        line.layout = traces[0].layout
         spread_percent = sum(t.spread_percent for t in traces) / len(traces)
         line.cells[builder] = Cell(speed, speed / base if base else None, spread_percent)
     return line
@@ -285,11 +311,11 @@ def _time_by_cost(measured: Measured) -> Table:
         return (base.mrays / t.mrays) * (base.cost / t.cost)
 
     lines = []
-    for branching in BRANCHINGS:
-        baselines = _baselines(measured, branching)
-        (of_cost,) = _lines(measured, branching, (False,), baselines, cost)[:1]
+    for shape in WIDTHS:
+        baselines = _baselines(measured, shape)
+        (of_cost,) = _lines(measured, shape, (False,), baselines, cost)[:1]
         of_cost.statistic = "BVH cost"
-        lines += [of_cost, *_lines(measured, branching, (False, True), baselines, time_by_cost)]
+        lines += [of_cost, *_lines(measured, shape, (False, True), baselines, time_by_cost)]
     caption = (
         "BVH cost and trace time per unit of BVH cost, relative to LBVH of the same branching "
         "factor without reordering; mean over scenes and views."
@@ -307,7 +333,8 @@ def table_text(table: Table, measured: Measured) -> str:
     grid = [heads]
     for line in (line for line in table.lines if line.cells):
         cells = [_cell_text(line.cells.get(builder)) for builder in builders]
-        grid.append([line.scene or "all", str(line.branching), line.statistic, *cells])
+        of_width = width_text(line.branching, line.layout)
+        grid.append([line.scene or "all", of_width, line.statistic, *cells])
     widths = [max(map(len, column)) for column in zip(*grid, strict=True)]
     lines = []
     for words in grid:
@@ -315,7 +342,7 @@ def table_text(table: Table, measured: Measured) -> str:
         right = [f"{word:>{width}}" for word, width in zip(words[3:], widths[3:], strict=True)]
         lines.append("  ".join([*left, *right]).rstrip())
     lines.insert(1, "-" * (sum(widths) + 2 * (len(widths) - 1)))
-    return "\n".join([f"Table {table.number}. {table.caption}", _spread_text(table), *lines]) + "\n"
+    return "\n".join([f"Table {table.name}. {table.caption}", _spread_text(table), *lines]) + "\n"
 
 
 def _cell_text(cell: Cell | None) -> str:
@@ -346,11 +373,11 @@ def tables_csv(tables: Sequence[Table]) -> str:
     """All cells of all tables, one a line, with full precision."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    names = ("table", "scene", "branching", "statistic", "builder")
+    names = ("table", "scene", "branching", "layout", "statistic", "builder")
     writer.writerow([*names, "value", "relative_to_lbvh", "spread_percent"])
     for table in tables:
         for line in table.lines:
             for builder, cell in line.cells.items():
-                place = (table.number, line.scene, line.branching, line.statistic, builder)
-                writer.writerow([*place, *cell])
+                place = (table.name, line.scene, line.branching, line.layout, line.statistic)
+                writer.writerow([*place, builder, *cell])
     return out.getvalue()

@@ -10,7 +10,18 @@ from dataclasses import asdict, dataclass, field
 from itertools import product
 from typing import Any
 
-from .records import from_plain
+from .precision import (
+    BOX_TESTS,
+    CONSERVATIVE,
+    CWBVH_BRANCHING,
+    FULL,
+    LAYOUTS,
+    TRIANGLE_TESTS,
+    WATERTIGHT,
+    has_layout,
+    is_exact,
+)
+from .records import from_plain, parse_json
 
 BRANCHINGS = (2, 4, 8)
 PRESETS = ("quick", "paper")
@@ -32,6 +43,14 @@ BUILDERS = (
     "hybrid",
 )
 
+# Lists of names: the field of Plan, what one of them is called, and those that there are.
+CHOICES: dict[str, tuple[str, Sequence[str]]] = {
+    "reorders": ("reorder", REORDERS),
+    "layouts": ("layout", tuple(LAYOUTS)),
+    "triangle_tests": ("triangle test", tuple(TRIANGLE_TESTS)),
+    "box_tests": ("box test", tuple(BOX_TESTS)),
+}
+
 # Where the presets differ from the builders' defaults. Annealing: the paper runs 3000 iterations.
 QUICK_ITERATIONS = 200
 UNLIMITED_REFERENCES = 2.0**31
@@ -50,13 +69,17 @@ class Variant:
     branching: int
     reorder: str
     device: str
+    layout: str = FULL
+    triangle_test: str = WATERTIGHT
+    box_test: str = CONSERVATIVE
 
     @property
     def name(self) -> str:
-        """Name for files and look-up, e.g. "sbvh_8" or "sbvh_8_aila"."""
+        """Name for files and look-up, e.g. "sbvh_8", "sbvh_8_cwbvh_plain" or "sbvh_8_aila"."""
         parts = [self.builder, str(self.branching)]
-        if self.reorder != "off":
-            parts.append(self.reorder)
+        defaults = {FULL, WATERTIGHT, CONSERVATIVE, "off"}
+        choices = (self.layout, self.triangle_test, self.box_test, self.reorder)
+        parts += [choice for choice in choices if choice not in defaults]
         if self.device != "cpu":
             parts.append("".join(c if c.isalnum() else "-" for c in self.device))
         return "_".join(parts)
@@ -67,6 +90,8 @@ class Plan:
     """Every choice of a study. `check` names the first bad one.
 
     ``reorders`` are of `REORDERS`: how secondary and shadow rays are sorted before they are traced.
+    ``layouts``, ``triangle_tests`` and ``box_tests`` are of the module `precision`. Layout "cwbvh"
+    is for branching factor 8 alone: the others have no such variant.
     ``views`` is a number of cameras (the first ones of the scene) or their names.
 
     Pictures have ``width`` x ``height`` pixels, 0 for both meaning ``long_side`` along the longer
@@ -88,6 +113,9 @@ class Plan:
     branchings: list[int] = field(default_factory=lambda: list(BRANCHINGS))
     reorders: list[str] = field(default_factory=lambda: ["off"])
     devices: list[str] = field(default_factory=lambda: ["cpu"])
+    layouts: list[str] = field(default_factory=lambda: list(LAYOUTS))
+    triangle_tests: list[str] = field(default_factory=lambda: [WATERTIGHT])
+    box_tests: list[str] = field(default_factory=lambda: [CONSERVATIVE])
     params: dict[str, dict[str, float]] = field(default_factory=lambda: deepcopy(QUICK_PARAMS))
     views: int | list[str] = 3
     long_side: int = 256
@@ -115,7 +143,9 @@ class Plan:
 
         "paper" is Meister & Bittner 2022, section 4: 1024 x 768 pixels, 32 samples, depth 8 with
         two shadow rays a hit, three views, with and without reordering, c_T = 3, c_I = 2 and the
-        builders' settings: their defaults, without a limit on duplicated references.
+        builders' settings: their defaults, without a limit on duplicated references. Nodes are full
+        ones, the paper has no compressed ones. Hits are ours, exact; the paper's triangle test is
+        "woop_affine".
         """
         if preset not in PRESETS:
             raise ValueError(f"unknown preset {preset!r}; there are: {', '.join(PRESETS)}")
@@ -124,6 +154,7 @@ class Plan:
         return cls(
             preset="paper",
             reorders=["off", "aila"],
+            layouts=[FULL],
             params=deepcopy(PAPER_PARAMS),
             width=1024,
             height=768,
@@ -138,8 +169,9 @@ class Plan:
         if self.preset == "paper":
             note = (
                 "Preset paper: 1024x768 pixels, 32 samples, depth 8, two shadow rays a hit, no "
-                "Russian roulette, three views, c_T = 3, c_I = 2 and the paper's builder settings, "
-                "but for what was set otherwise."
+                "Russian roulette, three views, c_T = 3, c_I = 2, full nodes (no cwbvh) and the "
+                "paper's builder settings, but for what was set otherwise. Where the paper tests "
+                "triangles by Woop's affine transform (woop_affine), the default here is exact."
             )
         else:
             long_side = f"{self.long_side} pixels along the longer side"
@@ -159,11 +191,24 @@ class Plan:
         return note
 
     def variants(self) -> list[Variant]:
-        """All combinations, builders slowest."""
+        """All combinations that there are, builders slowest."""
         return [
-            Variant(*choice)
-            for choice in product(self.builders, self.branchings, self.reorders, self.devices)
+            Variant(builder, branching, reorder, device, layout, triangle_test, box_test)
+            for builder, branching, layout, triangle_test, box_test, reorder, device in product(
+                self.builders,
+                self.branchings,
+                self.layouts,
+                self.triangle_tests,
+                self.box_tests,
+                self.reorders,
+                self.devices,
+            )
+            if has_layout(branching, layout)
         ]
+
+    def all_exact(self) -> bool:
+        """Whether all variants promise exact hits: triangle and box test are the default."""
+        return all(is_exact(t, b) for t in self.triangle_tests for b in self.box_tests)
 
     def check(
         self,
@@ -184,7 +229,7 @@ class Plan:
                 _check_device(device, devices)
 
     def _check_lists(self) -> None:
-        for name in ("builders", "branchings", "reorders", "devices"):
+        for name in ("builders", "branchings", "devices", *CHOICES):
             values = getattr(self, name)
             if not values:
                 raise ValueError(f"{name} is empty; name at least one")
@@ -193,9 +238,15 @@ class Plan:
         for branching in self.branchings:
             if branching not in BRANCHINGS:
                 raise ValueError(f"branching {branching} is not known; it is 2, 4 or 8")
-        for reorder in self.reorders:
-            if reorder not in REORDERS:
-                raise ValueError(f"unknown reorder {reorder!r}; there are: {', '.join(REORDERS)}")
+        for name, (what, known) in CHOICES.items():
+            for value in getattr(self, name):
+                if value not in known:
+                    raise ValueError(f"unknown {what} {value!r}; there are: {', '.join(known)}")
+        if not any(has_layout(b, layout) for b in self.branchings for layout in self.layouts):
+            raise ValueError(
+                f"layout cwbvh is {CWBVH_BRANCHING}-wide: choose branching {CWBVH_BRANCHING} or "
+                "the layout full, too"
+            )
         if self.preset not in PRESETS:
             raise ValueError(f"unknown preset {self.preset!r}; there are: {', '.join(PRESETS)}")
         if isinstance(self.views, list) and not self.views:
@@ -241,7 +292,7 @@ class Plan:
 
         In ``reorders``, false and true mean "off" and "aila": that is how it was once written.
         """
-        plain = json.loads(text)
+        plain = parse_json(text)
         if isinstance(plain, dict) and isinstance(reorders := plain.get("reorders"), list):
             named = {False: "off", True: "aila"}
             plain["reorders"] = [named[r] if isinstance(r, bool) else r for r in reorders]

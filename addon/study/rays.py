@@ -24,7 +24,7 @@ BYTES_PER_RAY = 45  # origin, direction, t_max and the reference's answer
 class RaySet:
     """Rays of one kind and bounce, traced together, with what they should meet.
 
-    ``t_max`` is a scalar or (N,) float32; ``reference`` holds the reference variant's answers,
+    ``t_max`` is a scalar or (N,) float32; ``reference`` holds the answers of the default tests,
     ``sampled`` the indices of the rays that brute force judged and ``judge`` its answers.
     """
 
@@ -198,4 +198,4 @@ def judge_rays(
         threads=plan.threads,
         token=token,
     )
-    rays.judge = Judge(mesh.vertices, mesh.triangles, origins, directions, Answers.of(truth))
+    rays.judge = Judge(core, mesh, origins, directions, Answers.of(truth))

@@ -4,11 +4,34 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+import reprlib
 import types
 import typing
 from typing import Any, TypeVar
 
 T = TypeVar("T")
+
+_short = reprlib.Repr()  # of values in messages: a sentence, however long or deep the value
+_short.maxstring = _short.maxother = _short.maxlong = 80
+
+
+def parse_json(text: str) -> Any:
+    """The plain lists and dictionaries of a JSON text; raises ValueError.
+
+    Unlike `json.loads` it takes no NaN and no infinity, which no results have and JSON knows not.
+    """
+    try:
+        return json.loads(text, parse_float=_finite, parse_constant=_finite)
+    except RecursionError:
+        raise ValueError("lists or objects are nested too deeply") from None
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not abs(number) < float("inf"):
+        raise ValueError(f"{text[:40]} is no finite number")
+    return number
 
 
 def from_plain(kind: type[T], plain: Any, where: str = "") -> T:
@@ -36,6 +59,7 @@ def _convert(kind: Any, plain: Any, where: str) -> Any:
     if dataclasses.is_dataclass(kind):
         return _convert_record(kind, plain, where)
     if kind is float and type(plain) is int:
+        _expect(abs(plain) < 2**1023, "in the range of float", plain, where)
         return float(plain)
     _expect(type(plain) is kind, f"of type {kind.__name__}", plain, where)
     return plain
@@ -48,7 +72,7 @@ def _convert_union(kinds: tuple[Any, ...], plain: Any, where: str) -> Any:
         except ValueError:
             continue
     names = " or ".join(getattr(kind, "__name__", str(kind)) for kind in kinds)
-    raise ValueError(f"{where} must be {names}, not {plain!r}")
+    raise ValueError(f"{where} must be {names}, not {_short.repr(plain)}")
 
 
 def _convert_record(kind: Any, plain: Any, where: str) -> Any:
@@ -57,7 +81,9 @@ def _convert_record(kind: Any, plain: Any, where: str) -> Any:
     fields = {field.name: field for field in dataclasses.fields(kind) if field.init}
     unknown = sorted(set(plain) - set(fields))
     if unknown:
-        raise ValueError(f"{where} has no field {unknown[0]!r}; it has {', '.join(fields)}")
+        raise ValueError(
+            f"{where} has no field {_short.repr(unknown[0])}; it has {', '.join(fields)}"
+        )
     values = {name: _convert(hints[name], plain[name], f"{where}.{name}") for name in plain}
     try:
         return kind(**values)
@@ -67,4 +93,4 @@ def _convert_record(kind: Any, plain: Any, where: str) -> Any:
 
 def _expect(condition: bool, wanted: str, plain: Any, where: str) -> None:
     if not condition:
-        raise ValueError(f"{where} must be {wanted}, not {plain!r}")
+        raise ValueError(f"{where} must be {wanted}, not {_short.repr(plain)}")

@@ -43,6 +43,25 @@ def measuring_notes(plan: Plan, groups: int, slow_builds: Sequence[str]) -> list
     return notes
 
 
+def precision_notes(plan: Plan) -> list[str]:
+    """What layouts and tests beyond the default mean."""
+    notes = []
+    if any(variant.layout == "cwbvh" for variant in plan.variants()):
+        notes.append(
+            "8c: the eight boxes of a node compressed to 80 bytes, rounded outwards (cwbvh, "
+            "Ylitie et al. 2017), with the same hits. Its BVH cost, marked c, counts these "
+            "boxes and each triangle by itself: it is not to be compared with that of other rows."
+        )
+    if not plan.all_exact():
+        notes.append(
+            "Tests other than watertight (triangles) and conservative (boxes) are float arithmetic "
+            "as published, to be compared with: they may miss hits or name a wrong triangle, which "
+            "stands beside their speed. What they prepare for each triangle counts in bytes per "
+            "triangle, and in no time. They render no pictures: these would have their errors."
+        )
+    return notes
+
+
 def missing_ray_notes(result: Result, views: Sequence[View]) -> list[str]:
     """Views without a kind of ray that the plan asks for."""
     notes = []

@@ -15,13 +15,16 @@ from .html import html_page
 from .image_error import curves_csv
 from .judge import picture_difference
 from .output import file_stems, publish_folder, staged_folder
+from .precision_figure import speed_against_error
+from .precision_points import precision_csv, precision_points
 from .results import Result
 from .scene import Float32Array
 from .spreadsheet import rays_csv, rows_csv
-from .table import text_report
+from .table import text_report, title
 from .target_error import error_curves
 
 PICTURES = "pictures"
+PRECISION = "speed_against_error"
 CURVES = "error_against_time"
 Pictures = Mapping[tuple[str, str], Float32Array]  # (variant name, view name) -> (H, W, 3)
 
@@ -29,8 +32,8 @@ Pictures = Mapping[tuple[str, str], Float32Array]  # (variant name, view name) -
 def write_report(result: Result, pictures: Pictures, out: Path) -> None:
     """Write tables (txt, csv), results.json, index.html and pictures/ into the folder ``out``.
 
-    With a target error there are error_against_time.csv, .svg and .png, too; the figures only
-    where matplotlib is.
+    With a target error there are error_against_time.csv, .svg and .png, too, and with several
+    triangle or box tests speed_against_error; the figures only where matplotlib is.
 
     Everything is written into a new folder beside it and renamed at the end. Raises OSError.
     """
@@ -42,13 +45,13 @@ def write_report(result: Result, pictures: Pictures, out: Path) -> None:
 def fill_report(result: Result, pictures: Pictures, folder: Path) -> None:
     """Write the report's files into a folder that exists."""
     files = write_pictures(result, pictures, folder) if pictures else {}
-    curves = write_curves(result, folder)
+    curves, precision = write_curves(result, folder), write_precision(result, folder)
     texts = {
         "table.txt": text_report(result),
         "results.csv": rows_csv(result),
         "rays.csv": rays_csv(result),
         "results.json": result.to_json(),
-        "index.html": html_page(result, files, folder, curves),
+        "index.html": html_page(result, files, folder, curves, precision),
     }
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
@@ -110,3 +113,21 @@ def write_curves(result: Result, folder: Path) -> Path | str:
     except FigureError as error:
         return f"The figure is left out, its numbers are in {CURVES}.csv: {error}."
     return folder / f"{CURVES}.png"
+
+
+def write_precision(result: Result, folder: Path) -> Path | str:
+    """Write speed against error of the precision choices as CSV and, with matplotlib, as figure.
+
+    Returns the PNG's path, a sentence that says why there is none, or "" for less than two choices.
+    """
+    if not (points := precision_points(result)):
+        return ""
+    (folder / f"{PRECISION}.csv").write_text(precision_csv(points), encoding="utf-8")
+    trees = points[0].trees
+    tree = title(result.row(result.reference)) if trees == 1 else f"mean over {trees} trees"
+    heading = f"{result.subject.name}, {result.subject.triangles:,d} triangles, {tree}"
+    try:
+        speed_against_error(points, folder / PRECISION, heading)
+    except FigureError as error:
+        return f"The figure is left out, its numbers are in {PRECISION}.csv: {error}."
+    return folder / f"{PRECISION}.png"

@@ -9,13 +9,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .accuracy import Accuracy, Errors
 from .convergence import Convergence, TimeToError
 from .plan import Plan
-from .records import from_plain
+from .precision import CONSERVATIVE, FULL, WATERTIGHT, is_exact
+from .records import from_plain, parse_json
 
 KINDS = ("primary", "secondary", "shadow")  # of rays: from the camera, from a hit on, to lights
 COUNTERS = ("node_visits", "box_tests", "triangle_tests")
-FORMAT = 2  # of results.json
+FORMAT = 3  # of results.json; 2 had no precision choices and no `Accuracy`
 
 
 class Spread(NamedTuple):
@@ -38,36 +40,6 @@ def spread(samples: list[float]) -> Spread:
 
 
 @dataclass
-class Errors:
-    """Answers that differ from a judge's, among ``judged`` rays. Exact ties are no errors.
-
-    ``wrong_triangles`` are hits on another triangle at another distance (by over 4 float32 ulp).
-    ``largest_t_error`` is the largest |t - t_judge| / t_judge where both hit the same triangle.
-    """
-
-    judged: int = 0
-    false_misses: int = 0
-    false_hits: int = 0
-    wrong_triangles: int = 0
-    largest_t_error: float = 0.0
-
-    @property
-    def wrong(self) -> int:
-        """Number of wrong hits of any sort."""
-        return self.false_misses + self.false_hits + self.wrong_triangles
-
-    def plus(self, other: Errors) -> Errors:
-        """The errors of both samples together."""
-        return Errors(
-            self.judged + other.judged,
-            self.false_misses + other.false_misses,
-            self.false_hits + other.false_hits,
-            self.wrong_triangles + other.wrong_triangles,
-            max(self.largest_t_error, other.largest_t_error),
-        )
-
-
-@dataclass
 class Measurement:
     """One variant, one view, one kind of ray, one bounce: rays that are traced together.
 
@@ -76,8 +48,8 @@ class Measurement:
     ``key_seconds``, ``sort_seconds`` and ``traverse_seconds`` have one entry per timed repeat;
     generating the rays is in none of them. ``node_visits``, ``box_tests`` and ``triangle_tests``
     are sums over ``rays``, from a run of their own (None where there are no counters).
-    ``hits_sha256`` is the hash of all answers, ``differing_rays`` how many differ from the
-    reference variant's.
+    ``hits_sha256`` is the hash of all answers. ``differing_rays`` is how many differ from the
+    reference's: bit for bit where they should be the same, else as `Errors` counts.
     """
 
     view: str
@@ -167,7 +139,12 @@ class Row:
     """One variant of the study (``system`` "bvh_lab") or a rival on the same rays ("embree").
 
     ``build_seconds`` has one entry per timed build; for our trees it is ``tree_seconds`` (the
-    binary tree) plus ``collapse_seconds``. ``threads`` is what was used. ``error`` is empty unless
+    binary tree) plus ``collapse_seconds``. ``threads`` is what was used. ``layout``,
+    ``triangle_test`` and ``box_test`` are of the module `precision`, and empty for a rival.
+    ``prepared_bytes`` are what the triangle test keeps beside the tree, ``prepare_seconds`` what
+    making that took, outside of all other times. ``bytes_per_triangle`` counts tree and prepared
+    bytes by triangle of the mesh.
+    ``accuracy`` pools all views and bounces of closest hits. ``error`` is empty unless
     the variant failed; what was measured until then stays. ``group`` numbers the variants that
     were measured interleaved: all are 1 unless the trees did not fit in memory together.
     ``time_to_error`` is there if the plan asked for it and the variant rendered that view.
@@ -181,15 +158,27 @@ class Row:
     reorder: str  # of plan.REORDERS
     device: str
     threads: int = 0
+    layout: str = FULL
+    triangle_test: str = WATERTIGHT
+    box_test: str = CONSERVATIVE
     group: int = 1
     error: str = ""
     tree: Tree | None = None
+    bytes_per_triangle: float | None = None
+    prepare_seconds: float = 0.0
+    prepared_bytes: int = 0
+    accuracy: Accuracy | None = None
     build_seconds: list[float] = field(default_factory=list)
     tree_seconds: list[float] = field(default_factory=list)
     collapse_seconds: list[float] = field(default_factory=list)
     measurements: list[Measurement] = field(default_factory=list)
     pictures: list[Picture] = field(default_factory=list)
     time_to_error: TimeToError | None = None
+
+    @property
+    def exact(self) -> bool:
+        """Whether it promises exact hits, and so those of all others that do, bit for bit."""
+        return self.system == "bvh_lab" and is_exact(self.triangle_test, self.box_test)
 
     def add_times(self, view: str, kind: str, bounce: int, hits: Any) -> None:
         """Append one repeat's seconds, of what `core.trace` returned, to its measurement."""
@@ -250,7 +239,7 @@ class Row:
         return total
 
     def differing_rays(self) -> int | None:
-        """Rays of all views and kinds answered otherwise than by the reference variant."""
+        """Rays of all views and kinds answered otherwise than by the reference."""
         if not self.measurements:
             return None
         return sum(m.differing_rays for m in self.measurements)
@@ -260,9 +249,9 @@ class Row:
         return max((p.largest_difference for p in self.pictures), default=None)
 
     def disagrees(self) -> bool:
-        """Whether one of our own variants answered otherwise than the reference: always a bug."""
+        """Whether one that promises exact hits answered otherwise than the reference: a bug."""
         different = bool(self.differing_rays()) or bool(self.picture_difference())
-        return self.system == "bvh_lab" and different
+        return self.exact and different
 
 
 @dataclass
@@ -315,7 +304,7 @@ class Result:
     started: str  # ISO 8601, UTC
     seconds: float = 0.0
     cancelled: bool = False
-    reference: str = ""  # name of the variant that the others are compared with
+    reference: str = ""  # name of the variant whose tree gave the answers that all are held to
     rows: list[Row] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)  # what was added, approximated or left out
     convergence: Convergence | None = None
@@ -347,9 +336,11 @@ class Result:
     @classmethod
     def from_json(cls, text: str) -> Result:
         """The result that `to_json` wrote; raises ValueError naming a bad field."""
-        plain = json.loads(text)
+        plain = parse_json(text)
         if isinstance(plain, dict) and plain.get("format") != FORMAT:
-            raise ValueError(f"results of format {plain.get('format')!r}; this reads {FORMAT}")
+            raise ValueError(
+                f"results of format {plain.get('format')!r}; this reads {FORMAT}: measure again"
+            )
         return from_plain(cls, plain)
 
 

@@ -30,18 +30,27 @@ from .contenders import (
     OurTree,
     TreeJob,
     embree_row,
+    held_bytes,
+    judged,
+    prepare,
     record_build,
     tree_jobs,
 )
 from .core_scene import core_scene
 from .estimate import Estimate
-from .judge import Answers, Judge, differing_rays, picture_difference
+from .judge import Answers, picture_difference
 from .machine import describe_machine, free_bytes
 from .plan import Plan
 from .progress import Event, Progress, RowChanged, Step
 from .rays import RaySet, View, choose_views, generate_rays, judge_rays
-from .remarks import SLOW_BUILD_SECONDS, iteration_notes, measuring_notes, missing_ray_notes
-from .results import COUNTERS, Measurement, Picture, Result, Row
+from .remarks import (
+    SLOW_BUILD_SECONDS,
+    iteration_notes,
+    measuring_notes,
+    missing_ray_notes,
+    precision_notes,
+)
+from .results import COUNTERS, Picture, Result, Row
 from .scene import Float32Array, Scene
 from .subject import subject_of
 from .table import title
@@ -127,6 +136,7 @@ class _Runner:
             self.result.cancelled = True
             self.result.notes.append("Stopped early: rows hold what was measured until then.")
         self.result.notes += iteration_notes(self.result.rows)
+        self.result.notes += precision_notes(self.plan)
         self.result.notes += measuring_notes(self.plan, self.group, self.slow_builds)
         self.result.notes += missing_ray_notes(self.result, self.views)
         self.result.notes += target_notes(self.result)
@@ -144,7 +154,7 @@ class _Runner:
                 self.group += 1
             built = build()
             held += built
-            sizes.append(sum(contender.bytes for contender in built))
+            sizes.append(held_bytes(built))
         self._measure(held)
 
     def _builds(self) -> Iterator[Callable[[], Sequence[Contender]]]:
@@ -155,7 +165,7 @@ class _Runner:
 
     def _build_tree(self, job: TreeJob) -> list[Contender]:
         rows = job.all_rows()
-        bvhs: dict[int, Any] = {}
+        bvhs: dict[tuple[int, str], Any] = {}
         self._enter(rows)
         with self._failing_alone(rows):
             for repeat in range(self.plan.build_repeats):
@@ -168,18 +178,19 @@ class _Runner:
                     self.progress.skip({f"build {job.builder}": left * guess})
                     self.slow_builds.append(job.label)
                     break
-            for bvh in bvhs.values():
+            for shape, bvh in bvhs.items():
                 bvh.validate()
+                prepare(self.core, job.rows[shape], bvh, self.plan, self.token)
         return self._started(
             [
-                OurTree(self.core, row, bvhs.get(branching), self.plan)
-                for branching, of_branching in job.rows.items()
-                for row in of_branching
+                OurTree(self.core, row, bvhs.get(shape), self.plan)
+                for shape, of_shape in job.rows.items()
+                for row in of_shape
             ]
         )
 
-    def _build_once(self, job: TreeJob) -> dict[int, Any]:
-        """One timed build: the binary tree, and from it the tree of each branching factor."""
+    def _build_once(self, job: TreeJob) -> dict[tuple[int, str], Any]:
+        """One timed build: the binary tree, and from it that of each branching and layout."""
         plan = self.plan
         tree = self.core.build_tree(
             self.mesh,
@@ -192,9 +203,10 @@ class _Runner:
             token=self.token,
         )
         bvhs = {}
-        for branching, rows in job.rows.items():
-            bvhs[branching] = tree.collapse(branching, token=self.token)
-            record_build(rows, bvhs[branching], plan)
+        for (branching, layout), rows in job.rows.items():
+            bvh = tree.collapse(branching, layout=layout, token=self.token)
+            record_build(rows, bvh, plan)
+            bvhs[branching, layout] = bvh
         return bvhs
 
     def _build_embree(self, mode: EmbreeMode) -> list[Contender]:
@@ -236,15 +248,17 @@ class _Runner:
         """Everything about a group of contenders, view by view."""
         for view in self.views:
             ours = [c for c in contenders if isinstance(c, OurTree) and not c.row.error]
+            ours.sort(key=lambda tree: not tree.row.exact)  # stable; prefers those as a reference
             if not view.sets and not any(self._prepare(view, tree) for tree in ours):
                 continue
             for rays in view.sets:
                 self._answer(view, rays, contenders)
             self._time(view, contenders)
+            exact = [tree for tree in ours if tree.row.exact]  # others have no picture
             if self.plan.pictures:
-                self._render(view, ours)
+                self._render(view, exact)
             if self.plan.target_error and view is self.views[0]:
-                self._judge_pictures(view, [tree for tree in ours if not tree.row.error])
+                self._judge_pictures(view, [tree for tree in exact if not tree.row.error])
             for contender in contenders:
                 finished = view is self.views[-1]
                 self.emit(RowChanged(copy.deepcopy(contender.row), finished))
@@ -265,6 +279,9 @@ class _Runner:
                     wanted = -(-self.plan.judged_rays // bounces)
                     seed = 1000 * self.views.index(view) + number
                     judge_rays(self.core, self.mesh, rays, wanted, self.plan, seed, self.token)
+                stage = f"exact answers to {rays.name} of view {view.name}"
+                with self.progress.step("trace", 0.0, stage):
+                    rays.reference = Answers.of(tree.trace_exactly(rays, self.token))
             if not self.result.reference:
                 self.result.reference = tree.row.name
         if tree.row.error:
@@ -281,39 +298,13 @@ class _Runner:
                 stage = f"checking {rays.name} of view {view.name}: {title(row)}"
                 with self._trace_step(rays, stage):
                     hit = contender.trace(rays, False, self.token)
-                row.measurements.append(self._judged(view, rays, Answers.of(hit), row))
+                judged(self.core, self.mesh, view.name, rays, hit, contender)
                 if isinstance(contender, OurTree):
                     with self._trace_step(rays, stage.replace("checking", "counting the work of")):
                         counted = contender.trace(rays, True, self.token)
                     for counter in COUNTERS:
                         total = int(getattr(counted, counter).sum(dtype=np.uint64))
                         setattr(row.measurements[-1], counter, total)
-
-    def _judged(self, view: View, rays: RaySet, answers: Answers, row: Row) -> Measurement:
-        if rays.reference is None:
-            rays.reference = answers
-        measurement = Measurement(
-            view.name,
-            rays.kind,
-            len(rays),
-            rays.bounce,
-            hits=int(answers.occluded.sum()),
-            hits_sha256=answers.sha256(),
-        )
-        if row.system == "bvh_lab":
-            measurement.differing_rays = differing_rays(answers, rays.reference)
-        else:  # a rival rounds otherwise: bits may differ where the hit does not
-            ours = Judge(
-                self.mesh.vertices,
-                self.mesh.triangles,
-                rays.origins,
-                rays.directions,
-                rays.reference,
-            )
-            measurement.differing_rays = ours.errors(answers).wrong
-        if rays.judge is not None:
-            measurement.errors = rays.judge.errors(answers.sample(rays.sampled))
-        return measurement
 
     def _time(self, view: View, contenders: Sequence[Contender]) -> None:
         """The timed repeats, interleaved; who begins changes from repeat to repeat."""

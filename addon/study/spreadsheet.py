@@ -11,6 +11,15 @@ from typing import Any
 
 from .results import COUNTERS, KINDS, Measurement, Result, Row, mrays_per_second, spread
 
+PRECISION = ("layout", "triangle_test", "box_test")
+ACCURACY = {  # column: field of `Accuracy`
+    "t_error_ulps_median": "t_ulps_median",
+    "t_error_ulps_99.9_percent": "t_ulps_high",
+    "t_error_ulps_largest": "t_ulps_largest",
+    "uv_error_median": "uv_median",
+    "uv_error_largest": "uv_largest",
+}
+
 
 def rows_csv(result: Result) -> str:
     """One line per row."""
@@ -39,8 +48,8 @@ def csv_record(row: Row) -> dict[str, Any]:
     """The row's line of the CSV file: column name to value, None where there is none."""
     tree = asdict(row.tree) if row.tree else {}
     errors = row.errors()
-    names = ("name", "label", "system", "builder", "branching", "reorder", "device", "threads")
-    record: dict[str, Any] = {name: getattr(row, name) for name in names}
+    names = ("name", "label", "system", "builder", "branching", *PRECISION, "reorder", "device")
+    record: dict[str, Any] = {name: getattr(row, name) for name in (*names, "threads")}
     for name in (
         "nodes",
         "leaves",
@@ -51,6 +60,8 @@ def csv_record(row: Row) -> dict[str, Any]:
         "cost",
     ):
         record[name] = tree.get(name)
+    record["bytes_per_triangle"] = row.bytes_per_triangle
+    record["prepare_seconds"] = row.prepare_seconds
     for name in ("build_seconds", "tree_seconds", "collapse_seconds"):
         seconds = getattr(row, name)
         record[name] = spread(seconds).median if seconds else None
@@ -64,7 +75,8 @@ def csv_record(row: Row) -> dict[str, Any]:
             record[f"{kind}_{counter}_per_ray"] = row.per_ray(counter, kind)
     for name in ("judged", "wrong", "false_misses", "false_hits", "wrong_triangles"):
         record[f"{name}_rays"] = getattr(errors, name)
-    record["largest_relative_t_error"] = errors.largest_t_error
+    for column, name in ACCURACY.items():
+        record[column] = getattr(row.accuracy, name) if row.accuracy else None
     record["differing_rays"] = row.differing_rays()
     record["largest_picture_difference"] = row.picture_difference()
     time = row.time_to_error
@@ -80,7 +92,8 @@ def csv_record(row: Row) -> dict[str, Any]:
 def measurement_record(row: Row, measurement: Measurement) -> dict[str, Any]:
     """One measurement's line of the CSV file of rays."""
     record: dict[str, Any] = {name: getattr(row, name) for name in ("name", "builder", "branching")}
-    record["reorder"] = row.reorder
+    for name in (*PRECISION, "reorder"):
+        record[name] = getattr(row, name)
     for name in ("view", "kind", "bounce", "rays", "hits", *COUNTERS, "differing_rays"):
         record[name] = getattr(measurement, name)
     speed = mrays_per_second([measurement]) if measurement.seconds else None
@@ -89,5 +102,7 @@ def measurement_record(row: Row, measurement: Measurement) -> dict[str, Any]:
     for name in ("key_seconds", "sort_seconds", "traverse_seconds"):
         seconds = getattr(measurement, name)
         record[name] = spread(seconds).median if seconds else None
+    for name in ("judged", "wrong", "false_misses", "false_hits", "wrong_triangles"):
+        record[f"{name}_rays"] = getattr(measurement.errors, name)
     record["hits_sha256"] = measurement.hits_sha256
     return record

@@ -6,7 +6,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from .plan import Plan
+from .accuracy import Errors
+from .method import method
+from .precision import BOX_TESTS, LAYOUTS, SHORT, TRIANGLE_TESTS, tests_in_words, width_text
 from .results import COUNTERS, KINDS, Result, Row, Spread, ratio
 
 MISSING = "-"  # in a cell without a value
@@ -20,19 +22,34 @@ class Column:
     unit: str
     cell: Callable[[Row], str]
     left: bool = False  # aligned; numbers stand right
+    key: bool = False  # names the row
 
 
-def columns(rows: Sequence[Row]) -> list[Column]:
-    """The columns that these rows need, in the order of the table."""
+def _key_columns(rows: Sequence[Row]) -> list[Column]:
+    """What names a row, where not all rows have it in common."""
     chosen = [
-        Column("builder", "", lambda row: row.label, left=True),
-        Column("branching", "factor", lambda row: str(row.branching or MISSING)),
+        Column("builder", "", lambda row: row.label, left=True, key=True),
+        Column("branching", "factor", _width, key=True),
     ]
+    more: list[tuple[bool, str, str, Callable[[Row], str]]] = [
+        (any(_tests(row) for row in rows), "triangle", "test", _triangle_test),
+        (any(_tests(row) for row in rows), "box", "test", _box_test),
+        (any(row.reorder != "off" for row in rows), "rays", "reordered", lambda row: row.reorder),
+        (len({row.device for row in rows}) > 1, "device", "", lambda row: row.device),
+    ]
+    chosen += [
+        Column(title, unit, cell, left=True, key=True) for need, title, unit, cell in more if need
+    ]
+    return chosen
+
+
+def columns(rows: Sequence[Row], detailed: bool = False) -> list[Column]:
+    """The columns that these rows need, in the order of the table; those that name a row first.
+
+    ``detailed`` adds how exact the right hits are.
+    """
+    chosen = _key_columns(rows)
     reordered = any(row.reorder != "off" for row in rows)
-    if reordered:
-        chosen.append(Column("rays", "reordered", lambda row: row.reorder, left=True))
-    if len({row.device for row in rows}) > 1:
-        chosen.append(Column("device", "", lambda row: row.device, left=True))
     for title, unit, name in (
         ("nodes", "", "nodes"),
         ("leaves", "", "leaves"),
@@ -42,8 +59,9 @@ def columns(rows: Sequence[Row]) -> list[Column]:
         chosen.append(Column(title, unit, _tree_number(name)))
     chosen += [
         Column("size", "MB", lambda row: f"{row.tree.bytes / 1e6:.1f}" if row.tree else MISSING),
+        Column("bytes", "/ triangle", lambda row: _optional(row.bytes_per_triangle, ".0f")),
         Column("build", "ms", _build),
-        Column("BVH cost", "", lambda row: f"{row.tree.cost:.1f}" if row.tree else MISSING),
+        Column("BVH cost", "", cost_text),
     ]
     chosen += [Column(kind, "MRays/s", _speed(kind)) for kind in KINDS]
     if reordered:
@@ -53,9 +71,17 @@ def columns(rows: Sequence[Row]) -> list[Column]:
         chosen.append(Column(f"relMSE {target:g}", "after s", _time_to_error))
     for counter, unit in zip(COUNTERS, ("visits", "boxes", "triangles"), strict=True):
         chosen += [Column(kind, unit, _per_ray(counter, kind)) for kind in KINDS]
+    accuracy = [
+        ("t error", "ulp, median", "t_ulps_median", ".2g"),
+        ("t error", "ulp, 99.9%", "t_ulps_high", ".2g"),
+        ("t error", "ulp, most", "t_ulps_largest", ".2g"),
+        ("u, v error", "median", "uv_median", ".1e"),
+        ("u, v error", "most", "uv_largest", ".1e"),
+    ]
     return [
         *chosen,
         Column("wrong", "hits", _wrong),
+        *(Column(t, unit, _accuracy(name, style)) for t, unit, name, style in accuracy if detailed),
         Column("differing", "rays", lambda row: _optional(row.differing_rays(), ",d")),
         Column("picture", "difference", lambda row: _optional(row.picture_difference(), ".3g")),
     ]
@@ -97,7 +123,41 @@ def _per_ray(counter: str, kind: str) -> Callable[[Row], str]:
 
 def _wrong(row: Row) -> str:
     errors = row.errors()
-    return f"{errors.wrong}/{errors.judged}" if errors.judged else MISSING
+    return errors_text(errors) if errors.judged else MISSING
+
+
+def errors_text(errors: Errors) -> str:
+    """E.g. "0 of 4608" or "12 of 4608 (3 missed)"."""
+    missed = f" ({errors.false_misses} missed)" if errors.false_misses else ""
+    return f"{errors.wrong} of {errors.judged}{missed}"
+
+
+def _accuracy(name: str, style: str) -> Callable[[Row], str]:
+    def cell(row: Row) -> str:
+        return _optional(getattr(row.accuracy, name) if row.accuracy else None, style)
+
+    return cell
+
+
+def _width(row: Row) -> str:
+    return width_text(row.branching, row.layout) if row.branching else MISSING
+
+
+def _tests(row: Row) -> list[str]:
+    return tests_in_words(row.triangle_test, row.box_test)
+
+
+def cost_text(row: Row) -> str:
+    """The cost; that of compressed nodes counts otherwise and is marked c."""
+    return f"{row.tree.cost:.1f}{SHORT.get(row.layout, '')}" if row.tree else MISSING
+
+
+def _triangle_test(row: Row) -> str:
+    return TRIANGLE_TESTS.get(row.triangle_test, row.triangle_test or MISSING)
+
+
+def _box_test(row: Row) -> str:
+    return BOX_TESTS.get(row.box_test, row.box_test or MISSING)
 
 
 def _optional(value: float | None, style: str) -> str:
@@ -115,13 +175,14 @@ def _with_spread(value: Spread | None, digits: int, repeats: int) -> str:
 def text_table(rows: Sequence[Row], width: int | None = None) -> str:
     """The aligned table, in as many blocks as it takes to stay within ``width`` characters.
 
-    Each block begins with builder and branching factor; without ``width`` there is one.
+    Each block begins with what names the rows; without ``width`` there is one.
     """
     chosen = columns(rows)
     cells = [[c.title, c.unit, *(c.cell(row) for row in rows)] for c in chosen]
     widths = [max(len(text) for text in column) for column in cells]
     blocks = []
-    for block in _blocks(widths, width):
+    keys = sum(column.key for column in chosen)
+    for block in _blocks(widths, keys, width):
         lines = []
         for i in range(len(rows) + 2):
             parts = (
@@ -134,9 +195,9 @@ def text_table(rows: Sequence[Row], width: int | None = None) -> str:
     return "\n\n".join(blocks) + "\n"
 
 
-def _blocks(widths: Sequence[int], width: int | None) -> list[list[int]]:
-    """Columns of each block: as many as fit beside the two that name the row."""
-    names = [0, 1]
+def _blocks(widths: Sequence[int], keys: int, width: int | None) -> list[list[int]]:
+    """Columns of each block: as many as fit beside the first ``keys``, which name the row."""
+    names = list(range(keys))
     blocks = [list(names)]
     for column in range(len(names), len(widths)):
         used = sum(widths[c] + 2 for c in blocks[-1]) + widths[column]
@@ -147,33 +208,53 @@ def _blocks(widths: Sequence[int], width: int | None) -> list[list[int]]:
 
 
 def title(row: Row) -> str:
-    """A row in words, e.g. "SBVH 8-wide" or "SBVH 8-wide, rays sorted (aila)"."""
-    name = f"{row.label} {row.branching}-wide" if row.branching else row.label
-    return name if row.reorder == "off" else f"{name}, rays sorted ({row.reorder})"
+    """A row in words, e.g. "SBVH 8-wide" or "SBVH 8-wide compressed, rays sorted (aila)"."""
+    words = [f"{row.label} {row.branching}-wide" if row.branching else row.label]
+    if row.layout == "cwbvh":
+        words[0] += f" {LAYOUTS[row.layout]}"
+    words += _tests(row)
+    if row.reorder != "off":
+        words.append(f"rays sorted ({row.reorder})")
+    return ", ".join(words)
 
 
 def fastest(result: Result) -> list[str]:
-    """Who was fastest for each kind of ray, with the spread and the error beside it."""
+    """Who was fastest for each kind of ray, with the spread and the error beside it.
+
+    Of those that promise exact hits where there are any; what is faster without that is named, too.
+    """
     lines = []
     for kind in KINDS:
         timed = [(speed, row) for row in result.rows if (speed := row.speed(kind))]
-        ours = [(speed, row) for speed, row in timed if row.system == "bvh_lab"]
+        ours = [pair for pair in timed if pair[1].system == "bvh_lab"]
         if not ours:
             continue
-        speed, best = max(ours, key=lambda pair: pair[0].median)
+        exact = [pair for pair in ours if pair[1].exact]
+        speed, best = max(exact or ours, key=lambda pair: pair[0].median)
         rivals = [
             f"{ratio(best, row, kind):.2f} times {title(row)}"
             for _, row in timed
             if row.system != "bvh_lab"
         ]
-        errors = best.errors()
-        said = [
-            f"{speed.median:.2f} MRays/s ±{speed.half_percent:.0f}%",
-            *rivals,
-            f"{errors.wrong} of {errors.judged} judged rays wrong",
-        ]
+        said = [f"{speed.median:.2f} MRays/s ±{speed.half_percent:.0f}%", *rivals, _judged(best)]
         lines.append(f"Fastest of ours for {kind} rays: {title(best)}, {', '.join(said)}.")
+        faster, other = max(ours, key=lambda pair: pair[0].median)
+        if faster.median > speed.median:
+            lines.append(
+                f"Faster with a test that may be wrong: {title(other)}, {faster.median:.2f} "
+                f"MRays/s ±{faster.half_percent:.0f}%, {_judged(other)}, {_differing(other)}."
+            )
     return lines
+
+
+def _judged(row: Row) -> str:
+    return f"{errors_text(row.errors())} judged rays wrong"
+
+
+def _differing(row: Row) -> str:
+    """How many answers of all are wrong if the default's are right."""
+    rays = sum(m.rays for m in row.measurements)
+    return f"{row.differing_rays() or 0:,d} of all {rays:,d} otherwise than the default"
 
 
 def picture_quality(result: Result) -> list[str]:
@@ -207,51 +288,6 @@ def picture_quality(result: Result) -> list[str]:
 
 def _samples(count: float) -> str:
     return "1 sample" if count == 1 else f"{count:.1f}".removesuffix(".0") + " samples"
-
-
-def method(plan: Plan) -> list[str]:
-    """What was measured and how, a sentence each."""
-    judged = f"{plan.judged_rays} rays of each view and kind"
-    builds = f"median of {plan.build_repeats} builds" if plan.build_repeats > 1 else "one build"
-    lines = [
-        f"Speed: MRays/s from the median of {plan.repeats} timed runs after a warm-up, all "
-        "variants interleaved; the arithmetic mean over the views, as in the paper. ± is half the "
-        "distance between the quartiles. Sort keys, sorting and traversal are included, generating "
-        "the rays is not.",
-        "Rays: those that the path tracer traces for one path of each pixel, generated once and "
-        "traced by every variant, bounce by bounce; paths that have ended have none. Primary: "
-        "closest hit, from the camera. Secondary: closest hit, from a hit on, in directions that "
-        f"the material scatters to, for {plan.depth} bounces. Shadow: any hit, {plan.shadow_rays} "
-        "towards sampled lights from each hit where light can be found so.",
-        "Visits, boxes, triangles: interior nodes visited, their children's boxes tested and "
-        "triangles tested, per ray, counted in a run of their own.",
-    ]
-    if set(plan.reorders) != {"off"}:
-        lines.append(
-            "Rays reordered: secondary and shadow rays of a bounce are sorted by a key of 32 bits "
-            "(Meister et al. 2020; aila is the paper's) and traced in that order; primary rays are "
-            "not. % sorting: what keys and sorting take of the time."
-        )
-    if plan.target_error:
-        lines.append(
-            f"Time to relMSE {plan.target_error:g}: of the first view's picture, without building "
-            "the tree. The samples needed, the same for all variants as their pictures are equal, "
-            "come from pictures of 1, 2, 4, ... samples against a converged reference of other "
-            "random numbers, interpolated on log-log axes; the seconds are those samples times the "
-            "variant's seconds per sample in its one render of its picture (no repeats)."
-        )
-    return [
-        *lines,
-        f"Build: {builds}, binary tree and collapse together.",
-        "BVH cost: Eq. 2 (binary) and 3 (wide) of Meister & Bittner 2022 with c_T = "
-        f"{plan.traversal:g}, c_I = {plan.intersection:g}.",
-        f"Wrong hits: against brute force in double precision on {judged}; equal distances (within "
-        "4 float32 ulp) are no error. Differing rays: against the first variant, bit for bit, over "
-        "all rays; for Embree by the rule for wrong hits.",
-        f"Picture: path traced, {plan.samples} samples per pixel, depth {plan.depth}, "
-        f"{plan.shadow_rays} shadow rays a hit; the difference is the largest of any channel "
-        "(linear) to the first variant's.",
-    ]
 
 
 def ray_counts(result: Result) -> list[str]:

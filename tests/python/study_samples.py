@@ -50,6 +50,7 @@ def small_plan(**changes: Any) -> Plan:
     fields: dict[str, Any] = {
         "builders": ["lbvh", "sah"],
         "branchings": [2, 8],
+        "layouts": ["full"],
         "views": 2,
         "long_side": 48,
         "samples": 1,

@@ -115,6 +115,17 @@ def test_devices_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
     assert json.loads(capsys.readouterr().out)["devices"] == core.devices()
 
 
+def test_precisions_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["precisions"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    offered = core.precisions()
+    assert [line.split()[1] for line in lines] == [
+        choice["id"] for name in ("layout", "triangle_test", "box_test") for choice in offered[name]
+    ]
+    assert cli.main(["precisions", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == offered
+
+
 def test_help_is_no_error(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["compare", "--help"]) == 0
     assert "--judged-rays" in capsys.readouterr().out
@@ -123,7 +134,7 @@ def test_help_is_no_error(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("", "the following arguments are required: compare | builders | devices"),
+        ("", "the following arguments are required: compare | builders | devices | precisions"),
         ("measure", "invalid choice: 'measure'"),
         ("compare", "compare needs a scene file: .blend, .npz, .obj or .ply"),
         ("compare MESH --builders nope", "unknown builder 'nope'; there are: lbvh, hlbvh, "),
@@ -134,6 +145,8 @@ def test_help_is_no_error(capsys: pytest.CaptureFixture[str]) -> None:
         ("compare MESH --samples x", "argument --samples: invalid int value: 'x'"),
         ("compare MESH --param sbvh.nope=1", "builder 'sbvh' has no parameter 'nope'"),
         ("compare MESH --reorder maybe", "unknown reorder 'maybe'; there are: off, aila, "),
+        ("compare MESH --layouts tiny", "unknown layout 'tiny'; there are: full, cwbvh"),
+        ("compare MESH --box-tests x", "unknown box test 'x'; there are: conservative, plain"),
         ("compare MESH --nope", "unrecognized arguments: --nope"),
     ],
 )

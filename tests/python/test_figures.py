@@ -24,6 +24,8 @@ from bvh_lab.study.figures import (
 from bvh_lab.study.image_error import Curve, Point
 from bvh_lab.study.paper_tables import Build, Measured, Trace
 from bvh_lab.study.plan import BUILDERS
+from bvh_lab.study.precision_figure import speed_against_error
+from bvh_lab.study.precision_points import PrecisionPoint
 from PIL import Image
 
 
@@ -159,3 +161,24 @@ def test_missing_matplotlib_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(FigureError, match="pip install matplotlib"):
         error_against_time([curve("SAH")], tmp_path / "f", "box")
+
+
+def test_speed_against_error(tmp_path: Path) -> None:
+    points = [
+        PrecisionPoint(
+            *(layout, triangle_test, box_test, 2, speed, 0.9 * speed, 1.1 * speed, 200_000, wrong),
+            *(0.25, 0.5, 0.5 if triangle_test == "watertight" else 3000.0),
+        )
+        for layout, slower in (("full", 1.0), ("cwbvh", 0.8))
+        for triangle_test, speed, wrong in (("watertight", slower, 0), ("woop_affine", 1.4, 31))
+        for box_test in ("conservative", "plain")
+    ]
+    speed_against_error(points, tmp_path / "f", "box")
+    words = ("watertight", "Woop affine", "plain boxes", "compressed nodes", "none", "0.01%")
+    svg = check_drawn(tmp_path / "f", "box", "wrong answers, of 200,000 rays", *words)
+    assert "Baldwin-Weber" not in svg
+
+
+def test_speed_against_error_needs_two_choices(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="at least two choices"):
+        speed_against_error([], tmp_path / "f", "box")

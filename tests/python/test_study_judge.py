@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Comparing answers bit for bit, and with a judge up to ties."""
+"""Comparing answers bit for bit, and with a judge up to exact ties."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
+from bvh_lab.native import core
+from bvh_lab.study.accuracy import Accuracy
 from bvh_lab.study.judge import Answers, Judge, differing_rays, picture_difference
 
 MISS = 0xFFFFFFFF
@@ -12,6 +15,7 @@ VERTICES = np.array(
     [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]], np.float32
 )
 TRIANGLES = np.array([[0, 1, 2], [1, 3, 2], [0, 1, 2], [4, 5, 6]], np.uint32)
+MESH = core.Mesh(VERTICES, TRIANGLES)
 ORIGINS = np.tile(np.float32([0.25, 0.25, 2.0]), (4, 1))
 DIRECTIONS = np.tile(np.float32([0.0, 0.0, -1.0]), (4, 1))
 
@@ -25,12 +29,12 @@ def answers(triangle: list[int], t: list[float], dtype: type = np.float32) -> An
 def judge(triangle: list[int], t: list[float]) -> Judge:
     count = len(t)
     truth = answers(triangle, t, np.float64)
-    return Judge(VERTICES, TRIANGLES, ORIGINS[:count], DIRECTIONS[:count], truth)
+    return Judge(core, MESH, ORIGINS[:count], DIRECTIONS[:count], truth)
 
 
 def test_same_answers_have_no_errors() -> None:
     errors = judge([3, MISS], [1.0, np.inf]).errors(answers([3, MISS], [1.0, np.inf]))
-    assert (errors.judged, errors.wrong, errors.largest_t_error) == (2, 0, 0.0)
+    assert (errors.judged, errors.wrong) == (2, 0)
 
 
 def test_misses_and_hits_are_told_apart() -> None:
@@ -54,14 +58,38 @@ def test_a_rounded_distance_to_a_tied_triangle_is_a_tie() -> None:
     assert judge([0], [2.0]).errors(answers([2], [off])).wrong == 0
 
 
-def test_the_distance_error_is_relative() -> None:
-    errors = judge([3], [1.0]).errors(answers([3], [1.5]))
-    assert (errors.wrong, errors.largest_t_error) == (0, 0.5)
+def test_a_neighbour_that_is_not_met_is_no_tie() -> None:
+    assert judge([0], [2.0]).errors(answers([1], [2.0])).wrong_triangles == 1  # in the same plane
+
+
+def test_deviations_are_from_the_exact_crossing_of_what_was_answered() -> None:
+    truth = [3, 0, 3, 3], [1.0, 2.0, 1.0, 1.0]
+    answered = answers([3, 2, 0, MISS], [1.5, 2.0, 2.0, np.inf])  # the third and fourth are wrong
+    deviations = judge(*truth).deviations(answered)
+    assert deviations.t_ulps.tolist() == [2.0**22, 0.0]  # an ulp of 1 is 2^-23
+    assert deviations.uv.tolist() == [0.25, 0.25]  # u = v = 1/4, and 0 was answered
+
+
+def test_any_hit_has_no_deviations() -> None:
+    truth = Answers(np.array([True, False]))
+    judged = Judge(core, MESH, ORIGINS[:2], DIRECTIONS[:2], truth)
+    assert len(judged.deviations(Answers(np.array([True, True]))).t_ulps) == 0
+
+
+def test_a_distance_that_is_no_number_is_the_largest_error() -> None:
+    deviations = judge([3, 3], [1.0, 1.0]).deviations(answers([3, 3], [np.nan, np.inf]))
+    assert deviations.t_ulps.tolist() == [np.finfo(np.float64).max] * 2
+
+
+def test_accuracy_pools_all_hits() -> None:
+    accuracy = Accuracy.of(np.arange(1001.0), np.linspace(0.0, 1.0, 1001))
+    assert accuracy == Accuracy(1001, 500.0, pytest.approx(999.0), 1000.0, 0.5, 1.0)
+    assert Accuracy.of(np.empty(0), np.empty(0)) is None
 
 
 def test_any_hit_has_only_misses_and_hits() -> None:
     truth = Answers(np.array([True, False, True, False]))
-    judged = Judge(VERTICES, TRIANGLES, ORIGINS, DIRECTIONS, truth)
+    judged = Judge(core, MESH, ORIGINS, DIRECTIONS, truth)
     errors = judged.errors(Answers(np.array([True, True, False, False])))
     assert (errors.judged, errors.false_misses, errors.false_hits) == (4, 1, 1)
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import builtins
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -97,6 +98,43 @@ def test_truncated_npz_is_named(tmp_path: Path) -> None:
     path.write_bytes(whole[:100] + b"\0" * 200 + whole[300:])
     with pytest.raises(LoadError, match=r"is not a readable \.npz file"):
         load_mesh_file(path)
+
+
+def test_npz_that_promises_more_than_it_holds_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "huge.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, shape, kind in (("vertices", (10**15, 3), "<f4"), ("triangles", (1, 3), "<u4")):
+            with archive.open(f"{name}.npy", "w") as file:
+                header = {"descr": kind, "fortran_order": False, "shape": shape}
+                np.lib.format.write_array_header_1_0(file, header)
+                file.write(FACE.tobytes())
+    with pytest.raises(LoadError, match=r"vertices has shape \(10{15}, 3\), but the file ends"):
+        load_mesh_file(path)
+
+
+def test_npz_larger_than_memory_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    np.savez_compressed(tmp_path / "a.npz", vertices=TRIANGLE, triangles=np.tile(FACE, (9999, 1)))
+    monkeypatch.setattr("bvh_lab.study.load.free_bytes", lambda: 1e5)
+    with pytest.raises(LoadError, match=r"triangles needs .* GiB, more than is free"):
+        load_mesh_file(tmp_path / "a.npz")
+
+
+def test_npz_of_an_unknown_compression_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    np.savez(path, vertices=TRIANGLE, triangles=FACE)
+    stored, unknown = b"\x14\0\0\0\0\0", b"\x14\0\0\0\x63\0"  # in the headers of the archive
+    path.write_bytes(path.read_bytes().replace(stored, unknown))
+    with pytest.raises(LoadError, match=r"is not a readable \.npz file: .*compression"):
+        load_mesh_file(path)
+
+
+@pytest.mark.parametrize("coordinate", [2e37, -1e39, 1e300])
+def test_coordinates_that_are_too_large_are_named(tmp_path: Path, coordinate: float) -> None:
+    vertices = TRIANGLE.astype(np.float64)
+    vertices[1, 0] = coordinate
+    np.savez(tmp_path / "far.npz", vertices=vertices, triangles=FACE)
+    with pytest.raises(LoadError, match=r"vertex 1 is .*: coordinates must be at most 1e\+37"):
+        load_mesh_file(tmp_path / "far.npz")
 
 
 def test_files_of_other_kinds_are_named(tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ from bvh_lab.study.paper_tables import (
     tables_csv,
 )
 from bvh_lab.study.plan import Plan
+from bvh_lab.study.precision import LAYOUTS
 from bvh_lab.study.results import Machine, Measurement, Result, Row, Subject, Tree
 
 PAPER = Path(__file__).resolve().parents[3] / "shared" / "paper"
@@ -87,9 +88,11 @@ def table(measured: Measured, number: int) -> Table:
     return found
 
 
-def line(of: Table, branching: int, statistic: str, scene: str = "") -> Line:
-    wanted = (branching, statistic, scene)
-    (found,) = (ln for ln in of.lines if (ln.branching, ln.statistic, ln.scene) == wanted)
+def line(of: Table, branching: int, statistic: str, scene: str = "", layout: str = "full") -> Line:
+    wanted = (branching, layout, statistic, scene)
+    (found,) = (
+        ln for ln in of.lines if (ln.branching, ln.layout, ln.statistic, ln.scene) == wanted
+    )
     return found
 
 
@@ -102,6 +105,31 @@ def test_only_our_rows_that_work_count(measured: Measured) -> None:
     }
     assert {t.kind for t in measured.traces if t.reordered} == {"secondary", "shadow"}
     assert max(t.mrays for t in measured.traces) == pytest.approx(4.0 * 1.25)  # none by origin
+
+
+def test_compressed_nodes_are_a_width_of_their_own() -> None:
+    rows = []
+    for layout, slower in (("full", 1.0), ("cwbvh", 1.25)):
+        for builder, cost in (("lbvh", 100.0), ("sah", 50.0)):
+            for test in ("watertight", "woop_affine"):
+                made = row(builder, 8, "off", cost * slower, [cost * slower / 100.0])
+                made.layout, made.triangle_test = layout, test
+                rows.append(made)
+    rows += [row("lbvh", 2, "off", 200.0, [2.0])]
+    measured = measured_by([result("hall", rows)])
+    assert len(measured.traces) == (2 * 2 + 1) * 2 * 3  # by default tests alone; views, kinds
+    one, five, compressed, six = (t for t in paper_tables(measured) if t.number in (1, 5, 6))
+    assert (five.name, compressed.name) == ("5", "5c")
+    assert "octal compressed BVHs" in compressed.caption
+    speeds = [line(one, 8, "shadow rays", "", layout).cells["sah"].value for layout in LAYOUTS]
+    assert speeds == pytest.approx([4.0, 3.2])
+    assert line(five, 8, "BVH cost", "hall").cells["lbvh"].value == 100.0
+    assert line(compressed, 8, "BVH cost", "hall", "cwbvh").cells["lbvh"].value == 125.0
+    relative = line(six, 8, "BVH cost", "", "cwbvh").cells
+    assert (relative["lbvh"].value, relative["sah"].value) == (1.0, 0.5)
+    assert "hall   8c  BVH cost" in table_text(compressed, measured)
+    assert "\n5c,hall,8,cwbvh,BVH cost,sah,62.5," in tables_csv([compressed])
+    assert {point.cost for point in cost_points(measured) if point.branching == 8} == {1.0, 0.5}
 
 
 def test_table_1_is_relative_to_the_binary_lbvh_as_the_rays_come(measured: Measured) -> None:

@@ -17,6 +17,7 @@ from bvh_lab.study.plan import (
     Plan,
     Variant,
 )
+from bvh_lab.study.precision import BOX_TESTS, LAYOUTS, TRIANGLE_TESTS, is_exact
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -28,14 +29,43 @@ def plan_of(*words: str) -> Plan:
 
 
 def test_variants_are_all_combinations_with_builders_slowest() -> None:
-    plan = Plan(builders=["lbvh", "sah"], branchings=[2, 8], reorders=["off", "aila"])
+    plan = Plan(
+        builders=["lbvh", "sah"], branchings=[2, 8], reorders=["off", "aila"], layouts=["full"]
+    )
     names = [variant.name for variant in plan.variants()]
     assert names[:4] == ["lbvh_2", "lbvh_2_aila", "lbvh_8", "lbvh_8_aila"]
     assert len(set(names)) == len(names) == 8
 
 
-def test_variant_name_holds_its_device() -> None:
+def test_variant_name_holds_what_is_not_the_default() -> None:
     assert Variant("sah", 4, "off", "opencl:a/b c").name == "sah_4_opencl-a-b-c"
+    assert Variant("sbvh", 8, "off", "cpu", "cwbvh").name == "sbvh_8_cwbvh"
+    assert (
+        Variant("sbvh", 8, "off", "cpu", triangle_test="woop_affine").name == "sbvh_8_woop_affine"
+    )
+    full_name = "sbvh_8_cwbvh_moller_trumbore_plain_aila"
+    assert Variant("sbvh", 8, "aila", "cpu", "cwbvh", "moller_trumbore", "plain").name == full_name
+
+
+def test_compressed_nodes_are_for_8_children_alone() -> None:
+    plan = Plan(builders=["sah"], layouts=["full", "cwbvh"])
+    assert [v.name for v in plan.variants()] == ["sah_2", "sah_4", "sah_8", "sah_8_cwbvh"]
+    plan.layouts = ["cwbvh"]
+    assert [v.name for v in plan.variants()] == ["sah_8_cwbvh"]
+
+
+def test_the_default_has_both_layouts_and_exact_tests() -> None:
+    plan = Plan()
+    assert len(plan.variants()) == 4 * len(BUILDERS) and plan.all_exact()
+    assert not Plan(box_tests=["conservative", "plain"]).all_exact()
+
+
+def test_precision_choices_are_those_of_the_core() -> None:
+    offered = core.precisions()
+    assert [choice["id"] for choice in offered["layout"]] == list(LAYOUTS)
+    assert [choice["id"] for choice in offered["triangle_test"]] == list(TRIANGLE_TESTS)
+    assert [choice["id"] for choice in offered["box_test"]] == list(BOX_TESTS)
+    assert is_exact(next(iter(TRIANGLE_TESTS)), next(iter(BOX_TESTS)))
 
 
 @pytest.mark.parametrize("preset", ["quick", "paper"])
@@ -66,6 +96,8 @@ def test_paper_preset_is_the_papers() -> None:
     assert (plan.width, plan.height, plan.traversal, plan.intersection) == (1024, 768, 3.0, 2.0)
     assert (plan.samples, plan.depth, plan.shadow_rays, plan.views) == (32, 8, 2, 3)
     assert plan.reorders == ["off", "aila"] and plan.ray_long_side == 0
+    assert plan.layouts == ["full"] and plan.all_exact()
+    assert "full nodes (no cwbvh)" in plan.preset_note() and "woop_affine" in plan.preset_note()
     assert all(Plan.from_preset(preset).repeats >= 5 for preset in PRESETS)
 
 
@@ -99,6 +131,18 @@ def test_orders_of_older_plans_are_read() -> None:
         ({"shadow_rays": -1}, "shadow_rays is -1"),
         ({"ray_long_side": 1}, "ray_long_side is 1; it must be from 8"),
         ({"reorders": ["off", "on"]}, "unknown reorder 'on'; there are: off, aila, "),
+        ({"layouts": ["cwbvh8"]}, "unknown layout 'cwbvh8'; there are: full, cwbvh$"),
+        ({"layouts": ["full", "full"]}, "layouts names one twice"),
+        (
+            {"layouts": ["cwbvh"], "branchings": [2, 4]},
+            "layout cwbvh is 8-wide: choose branching 8",
+        ),
+        ({"triangle_tests": []}, "triangle_tests is empty"),
+        (
+            {"triangle_tests": ["woop"]},
+            "unknown triangle test 'woop'; there are: watertight, .*weber$",
+        ),
+        ({"box_tests": ["slabs"]}, "unknown box test 'slabs'; there are: conservative, plain$"),
         ({"views": 0}, "views is 0"),
         ({"views": []}, "views is empty"),
         ({"width": 64}, "64x0 needs both"),
@@ -126,6 +170,8 @@ plans = st.builds(
     builders=st.lists(st.text()),
     branchings=st.lists(st.integers()),
     reorders=st.lists(st.text()),
+    layouts=st.lists(st.text()),
+    triangle_tests=st.lists(st.text()),
     params=st.dictionaries(
         st.text(), st.dictionaries(st.text(), st.floats(allow_nan=False, allow_infinity=False))
     ),
@@ -191,6 +237,17 @@ def test_arguments_change_the_preset() -> None:
     assert plan.params["sbvh"] == {"max_references": UNLIMITED_REFERENCES, "alpha": 1e-4}
 
 
+def test_arguments_choose_precision() -> None:
+    plan = plan_of("--layouts", "cwbvh", "--triangle-tests", "all", "--box-tests", "plain")
+    assert plan.layouts == ["cwbvh"] and plan.box_tests == ["plain"]
+    assert plan.triangle_tests == list(TRIANGLE_TESTS)
+    plan = plan_of(
+        "--preset", "paper", "--layouts", "all", "--box-tests", "all", "--builders", "all"
+    )
+    assert (plan.layouts, plan.box_tests) == (list(LAYOUTS), list(BOX_TESTS))
+    assert plan.builders == list(BUILDERS)
+
+
 def test_arguments_name_views_and_resolutions() -> None:
     assert plan_of("--views", "Nave, Door").views == ["Nave", "Door"]
     plan = plan_of("--preset", "paper", "--resolution", "640x480")
@@ -204,6 +261,9 @@ def test_arguments_name_views_and_resolutions() -> None:
     [
         ("--branching two", "--branching: 'two' is not a whole number"),
         ("--branching 3", "branching 3 is not known"),
+        ("--layouts small", "unknown layout 'small'; there are: full, cwbvh"),
+        ("--triangle-tests ,", "triangle_tests is empty"),
+        ("--layouts cwbvh --branching 4", "layout cwbvh is 8-wide"),
         ("--resolution 5x5x5", "--resolution is like 512x384"),
         ("--resolution 0x64", "--resolution is like 512x384"),
         ("--param alpha=1", "--param is like sbvh.alpha=1e-5"),

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from bvh_lab.study.output import file_stems, staged_folder, write_text_aside
 from bvh_lab.study.report import write_report
-from bvh_lab.study.results import Measurement, Result, Row
+from bvh_lab.study.results import Accuracy, Errors, Measurement, Result, Row
 from bvh_lab.study.run import Study, compare
 from bvh_lab.study.table import fastest, ray_counts, text_report, text_table, title
 from PIL import Image
@@ -98,6 +98,71 @@ def test_text_shows_failures(study: Study) -> None:
     lines = [line for line in text_report(result).splitlines() if line.startswith("FAILED")]
     assert lines[0] == "FAILED  LBVH 2-wide: it broke"
     assert lines[1].startswith("FAILED  LBVH 8-wide: answers differ from lbvh_2: 3 rays")
+
+
+def precise_row(triangle_test: str, seconds: float, wrong: int, layout: str = "full") -> Row:
+    times = {"key_seconds": [0.0], "sort_seconds": [0.0], "traverse_seconds": [seconds]}
+    errors = Errors(100, false_misses=wrong // 2, false_hits=wrong - wrong // 2)
+    measured = Measurement("a", "primary", 1000, differing_rays=10 * wrong, errors=errors, **times)
+    return Row(
+        *(f"sah_8_{layout}_{triangle_test}", "SAH", "bvh_lab", "sah", 8, "off", "cpu"),
+        layout=layout,
+        triangle_test=triangle_test,
+        measurements=[measured],
+        accuracy=Accuracy(50, 0.25, 0.5 + wrong, 1.0 + wrong, 1e-8, 1e-7),
+        bytes_per_triangle=77.7,
+    )
+
+
+@pytest.fixture
+def precise(study: Study) -> Result:
+    """Two layouts and a test that is twice as fast and wrong."""
+    result = Result.from_json(study.result.to_json())
+    result.reference = "sah_8_full_watertight"
+    result.rows = [
+        precise_row("watertight", 2.0, 0),
+        precise_row("watertight", 2.5, 0, "cwbvh"),
+        precise_row("woop_affine", 1.0, 3),
+    ]
+    return result
+
+
+def test_table_names_precision_and_its_errors(precise: Result) -> None:
+    heads, units, _, *lines = text_table(precise.rows).splitlines()
+    assert heads.split()[:4] == ["builder", "branching", "triangle", "box"]
+    assert units.split()[:3] == ["factor", "test", "test"]
+    assert [line.split()[:3] for line in lines] == [
+        ["SAH", "8", "watertight"],
+        ["SAH", "8c", "watertight"],
+        ["SAH", "8", "Woop"],
+    ]
+    assert " 0 of 100 " in lines[0] and " 3 of 100 (1 missed) " in lines[2]
+    assert " 78 " in lines[0]
+    assert title(precise.rows[1]) == "SAH 8-wide compressed"
+    precise.rows[2].box_test = "plain"
+    assert title(precise.rows[2]) == "SAH 8-wide, Woop affine, plain boxes"
+
+
+def test_every_block_names_the_tests(precise: Result) -> None:
+    for block in text_table(precise.rows, 90).rstrip().split("\n\n"):
+        assert block.split()[:4] == ["builder", "branching", "triangle", "box"]
+
+
+def test_the_fastest_is_exact_and_a_faster_one_is_named(precise: Result) -> None:
+    best, faster = fastest(precise)
+    assert best.startswith("Fastest of ours for primary rays: SAH 8-wide, 0.00 MRays/s")
+    assert faster.startswith("Faster with a test that may be wrong: SAH 8-wide, Woop affine, ")
+    assert "3 of 100 (1 missed) judged rays wrong, 30 of all 1,000 otherwise" in faster
+
+
+def test_speed_against_error_is_in_the_report(precise: Result, tmp_path: Path) -> None:
+    write_report(precise, {}, tmp_path / "out")
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert {f"speed_against_error.{end}" for end in ("svg", "png", "csv")} <= names
+    page = Page()
+    page.feed((tmp_path / "out" / "index.html").read_text())
+    assert "Speed against error" in page.text and "ulp, 99.9%" in page.text
+    assert len(page.links) == 1
 
 
 class Page(HTMLParser):

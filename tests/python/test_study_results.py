@@ -11,6 +11,7 @@ import pytest
 from bvh_lab.study.plan import Plan
 from bvh_lab.study.results import (
     FORMAT,
+    Accuracy,
     Errors,
     Machine,
     Measurement,
@@ -105,10 +106,10 @@ def test_counters_are_per_ray_over_all_views() -> None:
 
 def test_errors_add_up() -> None:
     row = row_of(
-        Measurement("a", "primary", 9, errors=Errors(4, 1, 0, 1, 1e-7)),
-        Measurement("a", "shadow", 9, errors=Errors(5, 0, 2, 0, 3e-7)),
+        Measurement("a", "primary", 9, errors=Errors(4, 1, 0, 1)),
+        Measurement("a", "shadow", 9, errors=Errors(5, 0, 2, 0)),
     )
-    assert row.errors() == Errors(9, 1, 2, 1, 3e-7)
+    assert row.errors() == Errors(9, 1, 2, 1)
     assert row.errors().wrong == 4
 
 
@@ -126,6 +127,17 @@ def test_only_our_own_rows_can_disagree() -> None:
     assert not row.disagrees()
 
 
+@pytest.mark.parametrize(
+    ("field", "choice"), [("triangle_test", "woop_affine"), ("box_test", "plain")]
+)
+def test_only_the_default_tests_can_disagree(field: str, choice: str) -> None:
+    row = row_of(timed("a", 10, [1.0] * 3, differing_rays=1))
+    row.layout = "cwbvh"  # promises the same hits
+    assert row.exact and row.disagrees()
+    setattr(row, field, choice)
+    assert not row.exact and not row.disagrees() and row.differing_rays() == 1
+
+
 def test_a_picture_difference_is_a_disagreement() -> None:
     row = row_of()
     row.pictures = [Picture("a", 2, 2, 1, {"primary": 4}, 0.1, 0.1, "", 0.5, differing_pixels=1)]
@@ -139,6 +151,10 @@ rows = st.builds(
     Row,
     name=st.text(),
     error=st.text(),
+    layout=st.sampled_from(["full", "cwbvh", ""]),
+    triangle_test=st.text(),
+    bytes_per_triangle=st.none() | finite,
+    accuracy=st.none() | st.builds(Accuracy, counts, *[finite] * 5),
     tree=st.none() | st.builds(Tree, nodes=counts, average_leaf_size=finite, cost=finite),
     build_seconds=seconds,
     measurements=st.lists(
@@ -147,7 +163,7 @@ rows = st.builds(
             rays=counts,
             node_visits=st.none() | counts,
             triangle_tests=st.none() | counts,
-            errors=st.builds(Errors, judged=counts, largest_t_error=finite),
+            errors=st.builds(Errors, judged=counts, false_misses=counts),
             traverse_seconds=seconds,
         ),
         max_size=3,
@@ -203,6 +219,24 @@ def test_a_row_with_a_bad_field_is_named() -> None:
         Result.from_json(json.dumps(plain))
 
 
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[" * 100_000, "nested too deeply"),
+        ('{"a":' * 100_000, "nested too deeply"),
+        ('{"seconds": NaN}', "NaN is no finite number"),
+        ('{"seconds": -1e999}', "-1e999 is no finite number"),
+        ('{"seconds": 1' + 400 * "0" + "}", r"Result.seconds must be in the range of float"),
+        ('{"notes": "' + 5000 * "x" + '"}', r"Result.notes must be a list, not 'x+\.\.\.x+'$"),
+    ],
+)
+def test_texts_that_no_study_wrote_are_refused_in_a_sentence(text: str, message: str) -> None:
+    text = text.replace("{", f'{{"format": {FORMAT}, ', 1)
+    with pytest.raises(ValueError, match=message) as refusal:
+        Result.from_json(text)
+    assert len(str(refusal.value)) < 300
+
+
 def test_csv_has_a_line_per_row_with_full_precision() -> None:
     result = empty_result()
     result.rows = [row_of(timed("a", 10, [0.1, 0.3, 0.2])), row_of(name='with "quotes", commas')]
@@ -230,6 +264,24 @@ def test_csv_of_rays_has_a_line_per_bounce() -> None:
     assert (first["box_tests"], first["hits"], first["node_visits"]) == ("6", "2", "")
     assert float(first["mrays_per_second"]) == 3.0 and float(first["traverse_seconds"]) == 1.0
     assert second["mrays_per_second"] == second["traverse_seconds"] == ""
+
+
+def test_csv_tells_precision_and_errors() -> None:
+    result = empty_result()
+    row = row_of(timed("a", 10, [0.1] * 3, bounce=1))
+    row.measurements[0].errors = Errors(9, 1, 2, 3)
+    row.layout, row.triangle_test, row.box_test = "cwbvh", "woop_affine", "plain"
+    row.bytes_per_triangle, row.accuracy = 88.5, Accuracy(4, 0.25, 7.0, 8.0, 1e-8, 1e-6)
+    result.rows = [row, row_of()]
+    first, second = csv.DictReader(io.StringIO(rows_csv(result)))
+    choices = [first[name] for name in ("layout", "triangle_test", "box_test")]
+    assert choices == ["cwbvh", "woop_affine", "plain"]
+    assert first["bytes_per_triangle"] == "88.5" and second["bytes_per_triangle"] == ""
+    ulps = [first[f"t_error_ulps_{name}"] for name in ("median", "99.9_percent", "largest")]
+    assert ulps == ["0.25", "7.0", "8.0"] and second["t_error_ulps_median"] == ""
+    assert (first["uv_error_median"], first["uv_error_largest"]) == ("1e-08", "1e-06")
+    (line,) = csv.DictReader(io.StringIO(rays_csv(result)))
+    assert (line["layout"], line["box_test"], line["wrong_rays"]) == ("cwbvh", "plain", "6")
 
 
 def test_an_unknown_row_is_named() -> None:

@@ -14,10 +14,12 @@ import pytest
 from bvh_lab.native import core
 from bvh_lab.study import run
 from bvh_lab.study.job import Job
+from bvh_lab.study.precision import BOX_TESTS, LAYOUTS, TRIANGLE_TESTS
 from bvh_lab.study.progress import Event, RowChanged, Step
 from bvh_lab.study.results import COUNTERS, KINDS, Result
 from bvh_lab.study.run import Study, compare
 from bvh_lab.study.scene import Material
+from bvh_lab.study.table import fastest, text_table
 from study_samples import sample_scene, small_plan
 
 # Kinds and bounces of the rays of small_plan().
@@ -136,6 +138,94 @@ def test_embree_stands_beside(study: Study) -> None:
     assert all(row.build_seconds for row in rows)
 
 
+@pytest.fixture(scope="module")
+def precise() -> Study:
+    """All layouts and tests on one tree."""
+    plan = small_plan(
+        builders=["sah"],
+        branchings=[2, 8],
+        layouts=list(LAYOUTS),
+        triangle_tests=list(TRIANGLE_TESTS),
+        box_tests=list(BOX_TESTS),
+        embree=False,
+        judged_rays=256,
+    )
+    return compare(sample_scene(), plan)
+
+
+def test_precision_choices_are_rows(precise: Study) -> None:
+    result = precise.result
+    assert len(result.rows) == 3 * 4 * 2 and not result.failed()
+    assert result.rows[0].name == result.reference == "sah_2"
+    names = {"sah_8_cwbvh", "sah_8_woop_affine", "sah_8_cwbvh_moller_trumbore_plain"}
+    assert names < {row.name for row in result.rows}
+    for row in result.rows:
+        assert all(row.speed(kind) for kind in KINDS) and row.errors().judged > 1000
+        assert row.accuracy is not None and row.accuracy.hits > 100
+        if row.exact:
+            assert row.differing_rays() == row.errors().wrong == 0
+            assert row.accuracy.t_ulps_largest <= 0.5 + 1e-6  # rounded once, from double
+    assert any("8c: " in note for note in result.notes)
+    assert any("render no pictures" in note for note in result.notes)
+
+
+def test_one_build_serves_all_precision_choices(precise: Study) -> None:
+    rows = {row.name: row for row in precise.result.rows}
+    for name in ("sah_8_plain", "sah_8_woop_affine", "sah_8_woop_affine_plain"):
+        assert rows[name].build_seconds == rows["sah_8"].build_seconds
+        assert rows[name].tree == rows["sah_8"].tree
+    full, compressed = rows["sah_8"], rows["sah_8_cwbvh"]
+    assert compressed.tree_seconds == full.tree_seconds
+    assert compressed.collapse_seconds != full.collapse_seconds
+    assert full.tree is not None and full.bytes_per_triangle is not None
+    assert full.bytes_per_triangle == full.tree.bytes / 768
+    assert compressed.bytes_per_triangle is not None
+    assert compressed.bytes_per_triangle < full.bytes_per_triangle
+    for test, size in (("moller_trumbore", 0), ("woop_affine", 48), ("baldwin_weber", 40)):
+        row = rows[f"sah_8_{test}"]
+        assert row.bytes_per_triangle == (full.tree.bytes + row.prepared_bytes) / 768
+        assert 768 * size <= row.prepared_bytes <= 8 * 768 * size  # unused lanes of SIMD, too
+    assert rows["sah_8_woop_affine_plain"].prepare_seconds > 0.0 == full.prepare_seconds
+
+
+def test_only_exact_rows_render(precise: Study) -> None:
+    pictured = {name for name, _ in precise.pictures}
+    assert pictured == {"sah_2", "sah_8", "sah_8_cwbvh"}
+    assert {row.name for row in precise.result.rows if row.pictures} == pictured
+    assert precise.result.row("sah_8_plain").picture_difference() is None
+
+
+def test_tests_that_are_not_exact_need_no_exact_row() -> None:
+    plan = small_plan(builders=["sah"], branchings=[8], triangle_tests=["woop_affine"])
+    result = compare(sample_scene(), plan).result
+    assert not result.failed() and not any(row.pictures for row in result.rows)
+    assert result.rows[0].differing_rays() is not None
+
+
+def test_a_wrong_test_is_no_failure_and_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Box test plain made to lose every tenth ray."""
+
+    def losing_trace(bvh: Any, *arguments: Any, box_test: str = "conservative", **more: Any) -> Any:
+        hit = core.trace(bvh, *arguments, **more)
+        if box_test == "plain":
+            for name, lost in (("occluded", False), ("t", np.inf), ("triangle", 0xFFFFFFFF)):
+                if getattr(hit, name) is not None:
+                    getattr(hit, name)[::10] = lost
+        return hit
+
+    monkeypatch.setattr(run, "load", lambda: Double(trace=losing_trace))
+    plan = small_plan(builders=["sah"], branchings=[2], box_tests=["plain", "conservative"])
+    result = compare(sample_scene(), plan).result
+    plain, exact = result.row("sah_2_plain"), result.row("sah_2")
+    assert not result.failed() and result.reference == "sah_2"  # though it comes second
+    first = exact.measurements[0]
+    assert plain.measurements[0].differing_rays > 0.05 * first.hits
+    assert plain.errors().false_misses == plain.errors().wrong > 0 == exact.errors().wrong
+    (lost,) = (row for row in text_table(result.rows).splitlines() if " plain " in row)
+    assert f" of {plain.errors().judged} ({plain.errors().wrong} missed)" in lost
+    assert "SAH 2-wide, " in " ".join(fastest(result))  # not the one that loses hits
+
+
 def test_pictures_of_equal_variants_share_memory(study: Study) -> None:
     first, *rest = study.result.subject.views
     assert len(study.pictures) == 8 * 2
@@ -250,6 +340,7 @@ def test_a_variant_that_answers_otherwise_fails(monkeypatch: pytest.MonkeyPatch)
             return hit
         names = ("occluded", "t", "u", "v", "triangle", *COUNTERS)
         names += ("key_seconds", "sort_seconds", "traverse_seconds")
+        names += ("prepare_seconds", "prepared_bytes")
         lie = SimpleNamespace(**{name: getattr(hit, name) for name in names})
         lie.t = np.where(hit.occluded, np.nextafter(hit.t, np.float32(0)), hit.t)
         return lie

@@ -80,7 +80,7 @@ def test_study_writes_tables_and_figures(cube: Path) -> None:
 def test_bad_usage_is_named(tmp_path: Path) -> None:
     done = run("study.py", "--curves", "sbvh_3", "--out", tmp_path / "out")
     assert done.returncode == 2
-    assert "--curves takes variants like sbvh_8, not 'sbvh_3'" in done.stderr
+    assert "--curves takes variants like sbvh_8 and sbvh_8_cwbvh, not 'sbvh_3'" in done.stderr
 
 
 def test_cycles_agrees_on_the_cube(cube: Path) -> None:

@@ -18,13 +18,14 @@ from bvh_lab.study.arguments import add_plan_arguments, plan_from_arguments
 from bvh_lab.study.convergence import Convergence, ErrorPoint
 from bvh_lab.study.core_scene import core_scene
 from bvh_lab.study.job import Job
+from bvh_lab.study.method import method
 from bvh_lab.study.plan import Plan
 from bvh_lab.study.rays import choose_views
 from bvh_lab.study.report import write_report
 from bvh_lab.study.results import Machine, Picture, Result, Row, Subject
 from bvh_lab.study.run import Study, compare
 from bvh_lab.study.spreadsheet import rows_csv
-from bvh_lab.study.table import method, picture_quality, text_report, text_table
+from bvh_lab.study.table import picture_quality, text_report, text_table
 from bvh_lab.study.target_error import (
     LEAST_REFERENCE,
     MOST_REFERENCE,
