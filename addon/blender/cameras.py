@@ -6,26 +6,44 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..study.scene import Camera, Float64Array
+from ..study.scene import Camera, Float32Array, Float64Array
 from .notes import Notes
 
 
 def read_cameras(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, notes: Notes
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, vertices: Float32Array, notes: Notes
 ) -> list[Camera]:
-    """All cameras of the scene: the active one first, then by name."""
+    """All cameras of the scene: the active one first, then by name.
+
+    ``vertices``, (V, 3), are all that there is to see.
+    """
     objects = [obj for obj in scene.objects if obj.type == "CAMERA"]
     if scene.camera and scene.camera.type == "CAMERA" and scene.camera not in objects:
         objects.append(scene.camera)
     objects.sort(key=lambda obj: (obj != scene.camera, obj.name))
-    return [read_camera(obj.evaluated_get(depsgraph), scene, notes) for obj in objects]
+    cameras = []
+    for obj in objects:
+        evaluated = obj.evaluated_get(depsgraph)
+        cameras.append(read_camera(evaluated, scene, notes))
+        say_far_clipping(evaluated, vertices, notes)
+    return cameras
+
+
+def say_far_clipping(obj: bpy.types.Object, vertices: Float32Array, notes: Notes) -> None:
+    """Say that nothing is cut off, where the camera's far plane would cut something off."""
+    matrix = without_scale(np.array(obj.matrix_world))
+    position, ahead = matrix[:3, 3], -matrix[:3, 2]
+    farthest = (vertices @ ahead.astype(np.float32)).max()
+    if float(farthest) - float(position @ ahead) > obj.data.clip_end:
+        notes.add("approximated: far clipping is ignored, all is seen however far", obj.name)
 
 
 def read_camera(obj: bpy.types.Object, scene: bpy.types.Scene, notes: Notes) -> Camera:
     """One camera. Sensor fit, lens shift and the render settings' aspect end up in ``window``."""
     data = obj.data
     if data.type not in {"PERSP", "ORTHO"}:
-        notes.add("approximated: panoramic camera treated as perspective", obj.name)
+        kind = "panoramic" if data.type == "PANO" else "custom"
+        notes.add(f"approximated: {kind} camera treated as perspective", obj.name)
     # The frame's four corners in camera space, at some depth in front of the camera.
     corners = np.array([tuple(corner) for corner in data.view_frame(scene=scene)])
     if data.type != "ORTHO":

@@ -78,6 +78,7 @@ class BVHLAB_RE_engine(bpy.types.RenderEngine):
 @persistent
 def _forget(*_: object) -> None:
     viewport.close_all()
+    viewport.stop_timers()
     engine_final.notes_of.clear()
 
 

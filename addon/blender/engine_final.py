@@ -13,12 +13,13 @@ from ..native import load
 from ..study.core_scene import core_camera
 from ..study.scene import Camera, Float32Array
 from . import engine_passes, engine_scene
-from .cameras import read_camera
+from .cameras import read_camera, say_far_clipping
 from .engine_scene import Prepared, Settings
 from .engine_thread import AtWork, call_aside
 from .extract import ExtractError, extract_as_is
 from .notes import Notes
 from .store import scene_key
+from .unmodelled import say_passes
 
 MEBIBYTE = 1024.0 * 1024.0
 # Seconds that a pass may take: long enough that showing it costs little, short enough to watch.
@@ -32,10 +33,11 @@ at_work = AtWork()  # Blender's threads that are in `render_view_layer`
 
 @dataclass
 class Frame:
-    """What is rendered: ``size`` (width, height) in pixels, through ``camera``."""
+    """What is rendered: ``size`` (width, height) in pixels, through ``camera`` of ``object``."""
 
     size: tuple[int, int]
     camera: Camera
+    object: bpy.types.Object
 
 
 @dataclass
@@ -71,7 +73,10 @@ def render_view_layer(engine: bpy.types.RenderEngine, depsgraph: bpy.types.Depsg
     frame = read_frame(engine, depsgraph, notes)
     engine.update_stats("", "Reading the scene")
     extracted = extract_as_is(depsgraph, "render")
-    _say_left_out(scene, layer, notes)
+    say_far_clipping(frame.object, extracted.vertices, notes)
+    say_passes(scene, layer, notes)
+    if frame.camera.lens_radius > 0.0:
+        notes.fact("modelled: depth of field")
 
     clock, token = Clock(), core.Token()
 
@@ -204,9 +209,10 @@ def read_frame(
     if camera is None or camera.type != "CAMERA":
         raise ExtractError(f"Scene '{scene.name}' has no camera: add one and make it active.")
     width, height = engine.resolution_x, engine.resolution_y
-    found = read_camera(camera.evaluated_get(depsgraph), scene, notes)
+    camera = camera.evaluated_get(depsgraph)
+    found = read_camera(camera, scene, notes)
     if not render.use_border or engine.is_preview:
-        return Frame((width, height), found)
+        return Frame((width, height), found, camera)
     columns = _pixels(render.border_min_x, render.border_max_x, width)
     rows = _pixels(render.border_min_y, render.border_max_y, height)
     left, right, bottom, top = found.window
@@ -220,22 +226,13 @@ def read_frame(
     size = (columns[1] - columns[0], rows[1] - rows[0])
     if min(size) < 1:
         raise ExtractError("The render border is less than a pixel: draw a larger one.")
-    return Frame(size, replace(found, window=window))
+    return Frame(size, replace(found, window=window), camera)
 
 
 def _pixels(first: float, last: float, count: int) -> tuple[int, int]:
     """The pixels between two shares of a side; Blender rounds down, in single precision."""
     low, high = (int(np.float32(share) * np.float32(count)) for share in (first, last))
     return low, high
-
-
-def _say_left_out(scene: bpy.types.Scene, layer: bpy.types.ViewLayer, notes: Notes) -> None:
-    if scene.render.film_transparent:
-        notes.fact("left out: transparent film, alpha is 1 everywhere")
-    if scene.render.use_multiview:
-        notes.fact("left out: stereoscopy, every view shows the same picture")
-    if layer.material_override is not None:
-        notes.add("left out: material override of the view layer", layer.name)
 
 
 def _keep_notes(scene: bpy.types.Scene, notes: list[str], preview: bool) -> None:

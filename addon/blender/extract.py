@@ -17,6 +17,13 @@ from .materials import Materials
 from .notes import Notes
 from .render_geometry import with_render_depsgraph
 from .textures import Textures
+from .unmodelled import (
+    missing_libraries,
+    say_finish,
+    say_missing,
+    say_render,
+    say_view_layer,
+)
 from .world import read_world
 
 __all__ = ["ExtractError", "extract_as_is", "extract_scene"]
@@ -45,7 +52,8 @@ def extract_scene(
 def extract_as_is(depsgraph: bpy.types.Depsgraph, geometry: Literal["viewport", "render"]) -> Scene:
     """As `extract_scene`, of the dependency graph that a render engine is given.
 
-    Neither a camera nor light is added where the scene has none. In the calling thread.
+    Without cameras, for the engine has its own view; no light is added where the scene has none. In
+    the calling thread.
     """
     return _extract(
         depsgraph.scene, _scene_name(depsgraph.scene), depsgraph, geometry, fill_in=False
@@ -64,12 +72,9 @@ def _extract(
     materials = Materials(textures, notes)
     found = gather(depsgraph, geometry == "viewport", materials, notes)
     if len(found.triangles) == 0:
-        visible = "renderable" if geometry == "render" else "visible"
-        raise ExtractError(
-            f"Scene '{scene.name}' has no {visible} surface: add a mesh or show a hidden one."
-        )
+        raise ExtractError(_why_empty(scene, depsgraph, geometry))
     _say_geometry(found, geometry, notes)
-    cameras = read_cameras(scene, depsgraph, notes)
+    cameras = read_cameras(scene, depsgraph, found.vertices, notes) if fill_in else []
     if not cameras and fill_in:
         cameras = auto_cameras(found.vertices)
         notes.fact(f"no camera in the scene: added {len(cameras)} that frame it")
@@ -97,9 +102,18 @@ def _extract(
         source=bpy.data.filepath,
         frame=scene.frame_current,
     )
-    _say_features(extracted, scene, notes)
+    _say_features(extracted, notes)
+    _say_settings(scene, depsgraph, fill_in, notes)
     extracted.notes = notes.sentences()
     return extracted
+
+
+def _why_empty(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, geometry: str) -> str:
+    visible = "renderable" if geometry == "render" else "visible"
+    reason = f"Scene '{scene.name}' has no {visible} surface: add a mesh or show a hidden one"
+    if missing := missing_libraries(depsgraph):
+        reason += f", or bring back the missing library {missing[0]}"
+    return f"{reason}."
 
 
 def _say_geometry(found: Geometry, geometry: str, notes: Notes) -> None:
@@ -114,8 +128,8 @@ def _say_geometry(found: Geometry, geometry: str, notes: Notes) -> None:
     )
 
 
-def _say_features(extracted: Scene, scene: bpy.types.Scene, notes: Notes) -> None:
-    """What is modelled of what the scene uses, and what a render setting asks for in vain."""
+def _say_features(extracted: Scene, notes: Notes) -> None:
+    """What is modelled of what the scene uses."""
     models = {part.model for material in extracted.materials for part in material.components}
     features = {
         "smooth shading": extracted.normals is not None,
@@ -138,8 +152,17 @@ def _say_features(extracted: Scene, scene: bpy.types.Scene, notes: Notes) -> Non
     notes.fact("modelled: " + (", ".join(used) if used else "diffuse surfaces alone"))
     if "principled" in models and bpy.app.version < (4, 0, 0):
         notes.fact("approximated: the Principled BSDF of this Blender as that of Blender 4.0")
-    if scene.render.use_motion_blur:
-        notes.fact("left out: motion blur")
+
+
+def _say_settings(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, compared: bool, notes: Notes
+) -> None:
+    """What settings ask for in vain; ``compared``: Blender does nothing more to our pictures."""
+    say_missing(depsgraph, notes)
+    say_view_layer(depsgraph.view_layer, notes)
+    say_render(scene, notes)
+    if compared:
+        say_finish(scene, notes)
 
 
 def _scene_name(scene: bpy.types.Scene) -> str:

@@ -12,12 +12,14 @@ from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
+import numpy.typing as npt
 
 from ..study.scene import Float32Array, Float64Array, UInt32Array
 from .corners import CornerParts, normals_to_world
-from .local_mesh import LocalMesh, read_object
+from .local_mesh import LocalMesh, read_object, read_uvs
 from .materials import Materials
 from .notes import Notes
+from .unmodelled import say_object
 
 LEFT_OUT = {
     "VOLUME": "volumes",
@@ -65,21 +67,28 @@ def gather(
 
     Raises ExtractError for a non-finite vertex and for more vertices than uint32 counts.
     """
-    local_meshes: dict[tuple[int, tuple[str, ...]], LocalMesh] = {}
+    local_meshes: dict[int, LocalMesh] = {}
+    has_surface: dict[tuple[int, str], bool] = {}  # a curve is there as such and as a mesh
     parts = _Parts()
     for instance in depsgraph.object_instances:
         obj = instance.object
-        if not instance.show_self or not _has_surface(obj, viewport, notes):
+        if not instance.show_self:
             continue
-        slots = _slot_numbers(obj, materials)
-        by_slot = [materials.uv_layer(number) for number in slots.tolist()]
-        layers = tuple(dict.fromkeys(layer for layer in by_slot if layer is not None))
-        key = (obj.data.as_pointer(), layers)
-        if key not in local_meshes:
-            local_meshes[key] = read_object(obj, layers)
-        local = local_meshes[key]
-        if len(local.triangles):
-            _place(parts, local, np.array(instance.matrix_world), slots, by_slot, obj.name)
+        key = (obj.original.as_pointer(), obj.type)
+        if key not in has_surface:
+            has_surface[key] = _has_surface(obj, viewport, notes)
+        if not has_surface[key]:
+            continue
+        pointer = obj.data.as_pointer()
+        if pointer not in local_meshes:
+            local_meshes[pointer] = read_object(obj)
+        local = local_meshes[pointer]
+        if not len(local.triangles):
+            continue
+        slots = _slot_numbers(obj, local, materials)
+        layers = [materials.uv_layer(number) for number in slots.tolist()]
+        read_uvs(obj, local, layers)
+        _place(parts, local, np.array(instance.matrix_world), slots, layers, obj.name)
     if not parts.triangles:
         return Geometry(
             np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32), np.zeros(0, np.uint32)
@@ -92,7 +101,7 @@ def gather(
         parts.corners.uvs(len(triangles)) if materials.any_texture else None,
         parts.corners.normals(vertices, triangles),
         objects=len(parts.triangles),
-        meshes=len({key[0] for key, mesh in local_meshes.items() if len(mesh.triangles)}),
+        meshes=sum(len(mesh.triangles) > 0 for mesh in local_meshes.values()),
     )
 
 
@@ -106,30 +115,35 @@ def _has_surface(obj: bpy.types.Object, viewport: bool, notes: Notes) -> bool:
         notes.add(f"left out: {LEFT_OUT[obj.type]}", obj.name)
     if obj.type != "MESH":
         return False
-    systems = [system.settings for system in obj.particle_systems]
-    if any(system.type == "HAIR" and system.render_type == "PATH" for system in systems):
-        notes.add("left out: particle hair", obj.name)
     if viewport and obj.display_type in {"WIRE", "BOUNDS"}:
         notes.add("left out: drawn as wire or bounds in the viewport", obj.name)
         return False
-    if not (obj.visible_camera and obj.visible_shadow and obj.visible_diffuse):
-        notes.add("approximated: ray visibility is ignored, every ray sees these", obj.name)
+    say_object(obj, notes)
     return True
 
 
-def _slot_numbers(obj: bpy.types.Object, materials: Materials) -> UInt32Array:
-    """Scene-wide material number of each slot of ``obj``; number 0 stands for an empty slot."""
+def _slot_numbers(obj: bpy.types.Object, local: LocalMesh, materials: Materials) -> UInt32Array:
+    """Scene-wide material number of each slot of ``obj``, 0 for an empty slot.
+
+    And 0 for a slot that no triangle has: its material is not read.
+    """
     slots, own = obj.material_slots, obj.data.materials
-    found = []
-    for index in range(max(len(slots), len(own), 1)):
+    count = max(len(slots), len(own), 1)
+    numbers = np.zeros(count, np.uint32)
+    for index in sorted(set(_slots_of(local.distinct_slots, count).tolist())):
         material = own[index] if index < len(own) else None
         # The mesh's own list wins, which geometry nodes may have replaced, unless the slot belongs
         # to the object.
         beyond = index >= len(own)
         if index < len(slots) and (beyond or slots[index].link == "OBJECT"):
             material = slots[index].material
-        found.append(materials.number(material))
-    return np.array(found, np.uint32)
+        numbers[index] = materials.number(material)
+    return numbers
+
+
+def _slots_of(indices: npt.NDArray[np.int32], count: int) -> npt.NDArray[np.int32]:
+    """A face whose index lies beyond the last of so many slots takes the last one, as in Cycles."""
+    return np.clip(indices, 0, count - 1)
 
 
 def _place(
@@ -147,8 +161,7 @@ def _place(
     _check_finite(world, name)
     mirrored = np.linalg.det(linear) < 0.0
     corners = [0, 2, 1] if mirrored else [0, 1, 2]
-    # A face whose index lies beyond the last slot takes the last slot, as in Cycles.
-    slot = np.clip(local.slots, 0, len(slots) - 1)
+    slot = _slots_of(local.slots, len(slots))
     uvs = local.uvs_by_slot(slot, layers)
     parts.corners.add(
         len(local.triangles),

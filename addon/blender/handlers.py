@@ -16,9 +16,16 @@ def _forget(*_: object) -> None:
     store.clear()
 
 
+@persistent
+def _forget_deleted(*_: object) -> None:
+    if store.studies:
+        store.forget_deleted()
+
+
 def register() -> None:
-    """Stop and forget before another file opens, and at exit."""
+    """Stop and forget before another file opens, and at exit; forget what is deleted."""
     bpy.app.handlers.load_pre.append(_forget)
+    bpy.app.handlers.depsgraph_update_post.append(_forget_deleted)
     atexit.register(store.stop)
 
 
@@ -26,4 +33,5 @@ def unregister() -> None:
     """Stop and forget now."""
     store.clear()
     atexit.unregister(store.stop)
+    bpy.app.handlers.depsgraph_update_post.remove(_forget_deleted)
     bpy.app.handlers.load_pre.remove(_forget)

@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import bpy
 import numpy as np
@@ -18,8 +21,8 @@ class LocalMesh:
 
     ``vertices`` (V, 3) float32, ``triangles`` (T, 3) uint32, ``slots`` (T,) int32: material slots.
     ``smooth`` (T,) bool and ``normals``, (S, 3, 3) float32, of the corners of the S smooth
-    triangles; None where all are flat. ``uvs``: (T, 3, 2) float32 by UV map; "" is the one that
-    renders, and a map that the mesh lacks is missing.
+    triangles; None where all are flat. ``uvs``, those that were asked for with `read_uvs`:
+    (T, 3, 2) float32 by UV map, None where the mesh lacks it; "" is the one that renders.
     """
 
     vertices: Float32Array
@@ -27,7 +30,12 @@ class LocalMesh:
     slots: npt.NDArray[np.int32]
     smooth: npt.NDArray[np.bool_] | None = None
     normals: Float32Array | None = None
-    uvs: dict[str, Float32Array] = field(default_factory=dict)
+    uvs: dict[str, Float32Array | None] = field(default_factory=dict)
+
+    @cached_property
+    def distinct_slots(self) -> npt.NDArray[np.int32]:
+        """The material slots that a triangle has, ascending."""
+        return np.unique(self.slots)
 
     def uvs_by_slot(
         self, slot: npt.NDArray[np.int32], layers: list[str | None]
@@ -36,7 +44,7 @@ class LocalMesh:
 
         None where no slot has a map.
         """
-        wanted = {layer for layer in layers if layer is not None and layer in self.uvs}
+        wanted = {layer for layer in layers if layer is not None and self.uvs[layer] is not None}
         if not wanted:
             return None
         if len(wanted) == 1 and None not in layers and len(set(layers)) == 1:
@@ -48,41 +56,59 @@ class LocalMesh:
         return uvs
 
 
-def read_object(obj: bpy.types.Object, layers: tuple[str, ...]) -> LocalMesh:
-    """The evaluated object's mesh, with these UV maps."""
-    if not obj.data.is_editmode:
-        return _read_mesh(obj.data, layers)
-    try:  # in Edit Mode the evaluated mesh may be a shell around the edited one
-        return _read_mesh(obj.to_mesh(), layers)
+def read_object(obj: bpy.types.Object) -> LocalMesh:
+    """The evaluated object's mesh, without UV maps."""
+    with _mesh(obj) as mesh:
+        return _read_mesh(mesh)
+
+
+def read_uvs(obj: bpy.types.Object, local: LocalMesh, layers: Iterable[str | None]) -> None:
+    """Add UV maps to what was read of the same object's mesh, where they are not there yet."""
+    missing = {layer for layer in layers if layer is not None and layer not in local.uvs}
+    if not missing:
+        return
+    with _mesh(obj) as mesh:
+        loops = _triangle_loops(mesh)
+        for layer in missing:
+            uvs = _loop_uvs(mesh, layer)
+            local.uvs[layer] = uvs[loops] if uvs is not None else None
+
+
+@contextmanager
+def _mesh(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
+    """The mesh with its triangles; in Edit Mode the evaluated one may be a shell around another."""
+    is_shell = obj.data.is_editmode
+    mesh = obj.to_mesh() if is_shell else obj.data
+    try:
+        mesh.calc_loop_triangles()
+        yield mesh
     finally:
-        obj.to_mesh_clear()
+        if is_shell:
+            obj.to_mesh_clear()
 
 
-def _read_mesh(mesh: bpy.types.Mesh, layers: tuple[str, ...]) -> LocalMesh:
-    mesh.calc_loop_triangles()
+def _read_mesh(mesh: bpy.types.Mesh) -> LocalMesh:
     count = len(mesh.loop_triangles)
     vertices = np.empty(3 * len(mesh.vertices), np.float32)
     triangles = np.empty(3 * count, np.int32)
     slots = np.empty(count, np.int32)
+    smooth = np.empty(count, np.bool_)
     mesh.vertices.foreach_get("co", vertices)
     mesh.loop_triangles.foreach_get("vertices", triangles)
     mesh.loop_triangles.foreach_get("material_index", slots)
-    local = LocalMesh(vertices.reshape(-1, 3), triangles.view(np.uint32).reshape(-1, 3), slots)
-    smooth = np.empty(count, np.bool_)
     mesh.loop_triangles.foreach_get("use_smooth", smooth)
-    if not smooth.any() and not layers:
-        return local
-    loops = np.empty(3 * count, np.int32)
-    mesh.loop_triangles.foreach_get("loops", loops)
-    loops = loops.reshape(-1, 3)
+    local = LocalMesh(vertices.reshape(-1, 3), triangles.view(np.uint32).reshape(-1, 3), slots)
     if smooth.any():
         local.smooth = smooth
-        local.normals = _loop_normals(mesh)[loops[smooth]]
-    for layer in layers:
-        uvs = _loop_uvs(mesh, layer)
-        if uvs is not None:
-            local.uvs[layer] = uvs[loops]
+        local.normals = _loop_normals(mesh)[_triangle_loops(mesh)[smooth]]
     return local
+
+
+def _triangle_loops(mesh: bpy.types.Mesh) -> npt.NDArray[np.int32]:
+    """(T, 3): the face corners of each triangle."""
+    loops = np.empty(3 * len(mesh.loop_triangles), np.int32)
+    mesh.loop_triangles.foreach_get("loops", loops)
+    return loops.reshape(-1, 3)
 
 
 def _loop_normals(mesh: bpy.types.Mesh) -> Float32Array:

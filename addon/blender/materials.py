@@ -68,7 +68,7 @@ def read_material(
         reader.lost.add("approximated: several UV maps by the first")
     read = Material(
         material.name,
-        [_component(part) for part in parts],
+        [_component(part, textures) for part in parts],
         _emission(surface.emission, reader),
     )
     for kind in sorted(reader.lost):
@@ -159,31 +159,36 @@ def _limited(parts: list[Part], reader: Evaluator) -> list[Part]:
     ]
 
 
-def _component(part: Part) -> Component:
+def _component(part: Part, textures: Textures) -> Component:
     return Component(
         part.model,
-        _number_input(part.weight),
-        _color_input(part.color),
-        _number_input(part.roughness),
-        _number_input(part.metallic),
-        _number_input(part.transmission),
+        _number_input(part.weight, textures),
+        _color_input(part.color, textures),
+        _number_input(part.roughness, textures),
+        _number_input(part.metallic, textures),
+        _number_input(part.transmission, textures),
         part.ior,
         part.specular,
     )
 
 
-def _number_input(value: Value) -> float | Lookup:
-    return value.number if value.texel is None else value.lookup()
+def _number_input(value: Value, textures: Textures) -> float | Lookup:
+    return value.number if value.texel is None else _lookup(value, textures)
 
 
-def _color_input(value: Value) -> Color | Lookup:
-    return value.offset if value.texel is None else value.lookup()
+def _color_input(value: Value, textures: Textures) -> Color | Lookup:
+    return value.offset if value.texel is None else _lookup(value, textures)
+
+
+def _lookup(value: Value, textures: Textures) -> Lookup:
+    assert value.texel is not None
+    return value.lookup(textures.index(value.texel.request))
 
 
 def _emission(value: Value, reader: Evaluator) -> Color | Lookup:
     """Radiance, which cannot be negative."""
     if value.texel is not None:
-        return value.lookup()
+        return _lookup(value, reader.textures)
     if min(value.offset) < 0.0:
         reader.lost.add("left out: negative emission counts as 0")
     red, green, blue = (max(channel, 0.0) for channel in value.offset)

@@ -19,8 +19,44 @@ from . import images, preferences, store, summary
 from .extract import extract_scene
 from .properties import COLUMNS
 from .session import program
+from .text import sentence
 
 POLL_SECONDS = 0.1
+
+
+class Watch:
+    """What a running comparison holds of a window: a timer, and the status bar's text."""
+
+    def __init__(self) -> None:
+        self._timer: bpy.types.Timer | None = None
+        self._workspace = ""  # whose status bar shows our text
+
+    def start(self, context: bpy.types.Context) -> None:
+        """From now on the window sends TIMER events."""
+        self._timer = context.window_manager.event_timer_add(POLL_SECONDS, window=context.window)
+
+    def show(self, workspace: bpy.types.WorkSpace, text: str) -> None:
+        """Write into the status bar, and take the text out of a workspace that was left."""
+        if workspace.name != self._workspace:
+            self._clear_text()
+        workspace.status_text_set(text)
+        self._workspace = workspace.name
+
+    def stop(self) -> None:
+        """Give all of it back; also where Blender has no context, as when the add-on goes."""
+        if self._timer is not None:
+            bpy.context.window_manager.event_timer_remove(self._timer)
+            self._timer = None
+        self._clear_text()
+
+    def _clear_text(self) -> None:
+        workspace = bpy.data.workspaces.get(self._workspace)
+        if workspace is not None:
+            workspace.status_text_set(None)
+        self._workspace = ""
+
+
+watch = Watch()
 
 
 class BVHLAB_OT_compare(bpy.types.Operator):
@@ -34,8 +70,6 @@ class BVHLAB_OT_compare(bpy.types.Operator):
     )
     bl_options = {"REGISTER"}
 
-    _timer: bpy.types.Timer | None = None
-
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         reason = _why_not(context)
@@ -48,15 +82,14 @@ class BVHLAB_OT_compare(bpy.types.Operator):
             return self.execute(context)
         if not self._start(context):
             return {"CANCELLED"}
-        window_manager = context.window_manager
-        self._timer = window_manager.event_timer_add(POLL_SECONDS, window=context.window)
-        window_manager.modal_handler_add(self)
+        watch.start(context)
+        context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         running = store.running
         if running is None:  # another file was opened
-            self._end(context)
+            watch.stop()
             return {"CANCELLED"}
         if event.type == "ESC" and event.value == "PRESS":
             running.job.cancel()
@@ -65,13 +98,16 @@ class BVHLAB_OT_compare(bpy.types.Operator):
             return {"PASS_THROUGH"}
         running.poll()
         context.window_manager.bvh_lab.show(running.scene, list(running.rows))
-        context.workspace.status_text_set(
-            f"BVH Lab: {running.job.fraction:.0%}, {running.job.stage}   |   ESC: Stop"
+        watch.show(
+            context.workspace,
+            f"BVH Lab: {running.job.fraction:.0%}, {running.job.stage}   |   ESC: Stop",
         )
         _redraw(context)
         if running.job.running:
+            if store.is_deleted(running.scene):
+                running.job.cancel()
             return {"RUNNING_MODAL"}
-        self._end(context)
+        watch.stop()
         return self._finish(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -88,7 +124,7 @@ class BVHLAB_OT_compare(bpy.types.Operator):
     def cancel(self, context: bpy.types.Context) -> None:
         """Blender ends the operator: the file or the window is being closed."""
         store.stop()
-        self._end(context)
+        watch.stop()
 
     def _start(self, context: bpy.types.Context) -> bool:
         settings = context.scene.bvh_lab
@@ -98,7 +134,7 @@ class BVHLAB_OT_compare(bpy.types.Operator):
             plan.check(core.builders(), core.devices())
             scene = extract_scene(context, settings.geometry)
         except (ValueError, RuntimeError, MemoryError) as error:
-            self.report({"ERROR"}, _sentence(error))
+            self.report({"ERROR"}, sentence(error))
             return False
         store.start(context.scene, Job(scene, plan, program()), len(plan.variants()))
         return True
@@ -110,7 +146,10 @@ class BVHLAB_OT_compare(bpy.types.Operator):
         except (
             Exception
         ) as error:  # whatever the study raised: the user gets its text, not a traceback
-            self.report({"ERROR"}, _sentence(error))
+            self.report({"ERROR"}, sentence(error))
+            return {"CANCELLED"}
+        if store.is_deleted(key):
+            self.report({"WARNING"}, "Stopped: the scene that was compared is gone")
             return {"CANCELLED"}
         panel = context.window_manager.bvh_lab
         panel.show(key, [row.name for row in study.result.rows])
@@ -121,12 +160,6 @@ class BVHLAB_OT_compare(bpy.types.Operator):
         self.report(*_verdict(study, panel.kind))
         _redraw(context)
         return {"FINISHED"}
-
-    def _end(self, context: bpy.types.Context) -> None:
-        if self._timer is not None:
-            context.window_manager.event_timer_remove(self._timer)
-            self._timer = None
-            context.workspace.status_text_set(None)
 
 
 class BVHLAB_OT_stop(bpy.types.Operator):
@@ -186,8 +219,13 @@ class BVHLAB_OT_show_picture(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        study = store.study_of(context.scene)
-        return study is not None and any(name == _active(context) for name, _ in study.pictures)
+        study, active = store.study_of(context.scene), _active(context)
+        if study is None or not active:
+            return False
+        pictured = any(name == active for name, _ in study.pictures)
+        if not pictured and study.pictures:
+            cls.poll_message_set("This row has none: pictures are rendered by the exact tests only")
+        return pictured
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         study = store.study_of(context.scene)
@@ -258,8 +296,14 @@ def _why_not(context: bpy.types.Context) -> str:
         return "A comparison is running"
     if reason := store.native_reason():
         return reason
-    if not context.scene.bvh_lab.variants():
+    settings = context.scene.bvh_lab
+    if not (settings.builders() and settings.branchings()):
         return "Choose at least one builder and one branching factor"
+    if not settings.variants():
+        return (
+            "Choose at least one kind of nodes, one triangle test and one box test under Settings, "
+            "Advanced; compressed nodes need the branching factor 8"
+        )
     return ""
 
 
@@ -272,11 +316,6 @@ def _verdict(study: Study, kind: str) -> tuple[set[str], str]:
         return {"WARNING"}, f"Stopped: {len(result.rows)} variants were begun"
     said = summary.winner(result.rows, kind)
     return {"INFO"}, said[0] if said else "Nothing was hit by any ray"
-
-
-def _sentence(error: BaseException) -> str:
-    text = " ".join(str(error).split()) or type(error).__name__
-    return text[0].upper() + text[1:]
 
 
 def _redraw(context: bpy.types.Context) -> None:
@@ -294,4 +333,16 @@ CLASSES = (
     BVHLAB_OT_show_picture,
     BVHLAB_OT_export,
 )
-register, unregister = bpy.utils.register_classes_factory(CLASSES)
+
+
+def register() -> None:
+    """Add the operators."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """Take them away, and what a running one holds."""
+    watch.stop()
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

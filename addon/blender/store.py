@@ -39,8 +39,23 @@ studies: dict[str, Study] = {}
 
 
 def scene_key(scene: bpy.types.Scene) -> str:
-    """What names a scene for the length of a session; undo keeps it."""
-    return str(getattr(scene, "session_uid", scene.name_full))
+    """What names a scene for the length of a session; undo and renaming keep it.
+
+    Before Blender 4.1 it is the address, which undo keeps too, unless it brings a deleted scene
+    back. Another scene may get the address of a deleted one: see `forget_deleted`.
+    """
+    return str(getattr(scene, "session_uid", None) or scene.as_pointer())
+
+
+def is_deleted(key: str) -> bool:
+    """Whether no scene of the open file has this key."""
+    return all(scene_key(scene) != key for scene in bpy.data.scenes)
+
+
+def forget_deleted() -> None:
+    """Drop the studies of scenes that are gone, before another scene gets their key."""
+    for key in [key for key in studies if is_deleted(key)]:
+        del studies[key]
 
 
 def start(scene: bpy.types.Scene, job: Job, variants: int) -> Running:
@@ -51,12 +66,16 @@ def start(scene: bpy.types.Scene, job: Job, variants: int) -> Running:
 
 
 def finish() -> Study:
-    """Wait for the running job's end and keep its study; raises what the study raised."""
+    """Wait for the running job's end and keep its study; raises what the study raised.
+
+    Nothing is kept for a scene that was deleted meanwhile.
+    """
     global running
     assert running is not None
     ended, running = running, None
     study = ended.job.study
-    studies[ended.scene] = study
+    if not is_deleted(ended.scene):
+        studies[ended.scene] = study
     return study
 
 

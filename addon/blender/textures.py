@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import bpy
@@ -28,16 +29,41 @@ Part: TypeAlias = Literal["whole", "associated", "color", "alpha"]
 MAGENTA = np.array([[[1.0, 0.0, 1.0]]], np.float32)  # Blender's for a missing picture
 
 
+@dataclass(frozen=True)
+class Request:
+    """How a node looks an image up. ``alpha``: the look-up is of alpha, ``alpha_used``: that of
+    another node may be; of a picture without alpha neither matters.
+    """
+
+    image: bpy.types.Image
+    wrap: WrapName
+    closest: bool
+    cubic: bool
+    alpha_used: bool
+    alpha: bool
+
+    def key(self) -> tuple[object, ...]:
+        """Equal for what is looked up in the same way."""
+        how = (self.wrap, self.closest, self.cubic, self.alpha_used, self.alpha)
+        return (self.image.as_pointer(), *how)
+
+
 class Textures:
-    """The textures of a scene; the same image looked up in the same way is one of them."""
+    """The textures of a scene; the same image looked up in the same way is one of them.
+
+    A node asks for one when it is read, which costs nothing. The picture is read once it turns out
+    that a material or the world looks it up.
+    """
 
     def __init__(self, notes: Notes) -> None:
         self.found: list[Texture] = []
         self._notes = notes
+        self._requests: list[Request] = []
+        self._known: dict[tuple[object, ...], int] = {}
         self._numbers: dict[tuple[int, WrapName, bool, Part], int] = {}
         self._translucent: dict[int, bool] = {}
 
-    def index(
+    def request(
         self,
         image: bpy.types.Image,
         extension: str = "REPEAT",
@@ -45,27 +71,39 @@ class Textures:
         alpha_used: bool = False,
         alpha: bool = False,
     ) -> int:
-        """Number of the texture that an Image or Environment Texture node looks up.
+        """Ask for the texture of an Image or Environment Texture node: a number for `index`.
 
         ``alpha`` is of a look-up of alpha, ``alpha_used`` of a node of which both may be looked up:
         otherwise the colour is multiplied by alpha, as in Cycles.
         """
         image = image.original or image
-        wrap, closest = WRAPS[extension], interpolation == "Closest"
-        if interpolation == "Cubic":
+        if image.depth not in ALPHA_DEPTHS:
+            alpha_used = alpha = False
+        closest, cubic = interpolation == "Closest", interpolation == "Cubic"
+        asked = Request(image, WRAPS[extension], closest, cubic, alpha_used, alpha)
+        number = self._known.setdefault(asked.key(), len(self._requests))
+        if number == len(self._requests):
+            self._requests.append(asked)
+        return number
+
+    def index(self, request: int) -> int:
+        """Number in ``found`` of the texture of a request; the picture is read with its first."""
+        asked = self._requests[request]
+        image = asked.image
+        if asked.cubic:
             self._notes.add("approximated: cubic interpolation of a texture by linear", image.name)
         part: Part = "whole"
         # What lies outside of a clipped picture is transparent too.
-        clipped = extension == "CLIP" and image.depth in ALPHA_DEPTHS
+        clipped = asked.wrap == "clip" and image.depth in ALPHA_DEPTHS
         if clipped or self._is_translucent(image):
             if image.alpha_mode in {"STRAIGHT", "PREMUL"}:
-                part = "whole" if alpha_used else "associated"
+                part = "whole" if asked.alpha_used else "associated"
             else:  # alpha has nothing to do with the colour
-                part = "alpha" if alpha else "color"
-        key = (image.as_pointer(), wrap, closest, part)
+                part = "alpha" if asked.alpha else "color"
+        key = (image.as_pointer(), asked.wrap, asked.closest, part)
         if key not in self._numbers:
             self._numbers[key] = len(self.found)
-            self.found.append(self._read(image, wrap, closest, part))
+            self.found.append(self._read(image, asked.wrap, asked.closest, part))
         return self._numbers[key]
 
     def _is_translucent(self, image: bpy.types.Image) -> bool:

@@ -115,14 +115,14 @@ def _image(reader: Evaluator, node: Output) -> Value:
     if alpha and image.alpha_mode == "NONE":
         return constant(1.0)
     mapping, layer = coordinates.uv_coordinates(node, reader.lost)
-    index = reader.textures.index(
+    request = reader.textures.request(
         image,
         node.node.extension,
         node.node.interpolation,
         alpha_used=node.node.outputs["Alpha"].is_linked,
         alpha=alpha,
     )
-    texel = Texel(index, "alpha" if alpha else "rgb", mapping, layer, not image.is_float)
+    texel = Texel(request, "alpha" if alpha else "rgb", mapping, layer, not image.is_float)
     return Value(BLACK, WHITE, texel)
 
 

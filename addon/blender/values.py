@@ -18,13 +18,13 @@ NO_MAPPING: Mapping = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 @dataclass(frozen=True)
 class Texel:
-    """What is looked up: a channel of a texture, and where.
+    """What is looked up: a channel of the texture that was requested, and where.
 
     ``layer`` names the UV map, "" for the one that renders; ``rotation`` belongs to environments.
     ``bounded``: no channel lies outside [0, 1].
     """
 
-    texture: int
+    request: int
     channel: ChannelName = "rgb"
     mapping: Mapping = NO_MAPPING
     layer: str = ""
@@ -60,8 +60,9 @@ class Value:
         return Value(_each(lambda offset, scale: offset + 0.5 * scale, self.offset, self.scale))
 
     def times(self, factor: Color) -> Value:
-        """Channel by channel."""
-        return replace(self, offset=_times(self.offset, factor), scale=_times(self.scale, factor))
+        """Channel by channel; times 0 nothing is looked up."""
+        scale = _times(self.scale, factor)
+        return Value(_times(self.offset, factor), scale, self.texel if any(scale) else None)
 
     def plus(self, summand: Color) -> Value:
         """Channel by channel."""
@@ -87,12 +88,10 @@ class Value:
             texel = replace(texel, channel=SINGLE[index])
         return Value(_grey(self.offset[index]), _grey(self.scale[index]), texel)
 
-    def lookup(self) -> Lookup:
-        """As the study's scene has it; only with a texel."""
+    def lookup(self, texture: int) -> Lookup:
+        """As the study's scene has it, of the texture of that index; only with a texel."""
         assert self.texel is not None
-        return Lookup(
-            self.texel.texture, self.texel.channel, self.scale, self.offset, self.texel.mapping
-        )
+        return Lookup(texture, self.texel.channel, self.scale, self.offset, self.texel.mapping)
 
 
 def constant(value: Color | float) -> Value:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 import weakref
+from collections.abc import Callable
 
 import bpy
 
@@ -21,6 +22,7 @@ POLL_SECONDS = 0.03
 REST = 1.5
 
 _open: weakref.WeakSet[Viewport] = weakref.WeakSet()
+_timers: set[Callable[[], float | None]] = set()
 
 
 class Viewport:
@@ -97,11 +99,13 @@ def start(engine: bpy.types.RenderEngine) -> Viewport:
     def poll() -> float | None:
         owner, ours = engine_reference(), viewport_reference()
         if owner is None or ours is None or ours not in _open:
+            _timers.discard(poll)
             return None
         if ours.wants_drawing():
             owner.tag_redraw()
         return POLL_SECONDS
 
+    _timers.add(poll)
     bpy.app.timers.register(poll, first_interval=POLL_SECONDS)
     return made
 
@@ -110,6 +114,14 @@ def close_all() -> None:
     """End every viewport: another file opens, or the add-on or Blender goes."""
     for each in list(_open):
         each.close()
+
+
+def stop_timers() -> None:
+    """Take away what looks for news; not at exit, when Blender's timers are gone already."""
+    for poll in list(_timers):
+        if bpy.app.timers.is_registered(poll):
+            bpy.app.timers.unregister(poll)
+    _timers.clear()
 
 
 def visible_objects(depsgraph: bpy.types.Depsgraph) -> frozenset[str]:

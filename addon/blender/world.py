@@ -14,6 +14,7 @@ from .nodes import Input, Output, linked, node_tree
 from .notes import Notes
 from .shaders import ShaderReader
 from .textures import Textures
+from .unmodelled import say_world
 from .values import BLACK, WHITE, Texel, Value, constant
 
 SKY = (0.5, 0.5, 0.5)
@@ -43,9 +44,9 @@ class WorldReader(ShaderReader):
             self.lost.add("approximated: mirror ball by mid grey")
             return constant(SKY)
         rotation = coordinates.world_rotation(found, self.lost)
-        index = self.textures.index(node.image, interpolation=node.interpolation)
+        request = self.textures.request(node.image, interpolation=node.interpolation)
         rows = tuple(tuple(row) for row in rotation.tolist())
-        return Value(BLACK, WHITE, Texel(index, bounded=not node.image.is_float, rotation=rows))
+        return Value(BLACK, WHITE, Texel(request, bounded=not node.image.is_float, rotation=rows))
 
 
 def read_world(world: bpy.types.World | None, textures: Textures, notes: Notes) -> World:
@@ -55,6 +56,8 @@ def read_world(world: bpy.types.World | None, textures: Textures, notes: Notes) 
     reader = WorldReader(textures)
     radiance = _radiance(world, reader)
     made = _world(radiance, reader)
+    if made.texture is not None or max(made.color) > 0.0:
+        say_world(world, notes)
     for kind in sorted(reader.lost):
         notes.add(kind, f"world {world.name}")
     return made
@@ -87,6 +90,6 @@ def _world(radiance: Value, reader: WorldReader) -> World:
     if min(color) < 0.0:
         reader.lost.add("left out: negative emission counts as 0")
     red, green, blue = (max(channel, 0.0) for channel in color)
-    if texel is None:
+    if texel is None or max(red, green, blue) == 0.0:
         return World((red, green, blue))
-    return World((red, green, blue), texel.texture, np.array(texel.rotation))
+    return World((red, green, blue), reader.textures.index(texel.request), np.array(texel.rotation))

@@ -54,7 +54,7 @@ class Compare(EmptySceneTest):
         ours = [row for row in result.rows if row.system == "bvh_lab"]
         self.assertEqual(
             [row.name for row in ours],
-            [f"{builder}_{k}" for builder in SWITCHED_ON for k in (2, 4, 8)],
+            [f"{builder}_{k}" for builder in SWITCHED_ON for k in (2, 4, 8, "8_cwbvh")],
         )
         self.assertEqual([row.error for row in result.rows if row.error], [])
         self.assertEqual(result.failed(), [])
@@ -76,6 +76,8 @@ class Compare(EmptySceneTest):
         self.assertEqual(max(image.size), 32)
 
     def test_choices_reach_the_plan(self) -> None:
+        from bvh_lab.blender import summary
+
         settings = bpy.context.scene.bvh_lab
         for builder in SWITCHED_ON[1:]:
             setattr(settings, f"use_{builder}", False)
@@ -83,11 +85,19 @@ class Compare(EmptySceneTest):
         settings.use_reordering, settings.reorder_key = True, "octahedron"
         settings.geometry, settings.embree = "render", False
         settings.target_error = 0.25
+        settings.layout_cwbvh, settings.triangle_moller_trumbore = False, True
         self.assertEqual(settings.plan().target_error, 0.25)
         settings.pictures = False  # and so no error that could be judged
         bpy.ops.bvhlab.compare()
         result = self.study().result
-        self.assertEqual([row.name for row in result.rows], ["lbvh_8", "lbvh_8_octahedron"])
+        names = ["lbvh_8", "lbvh_8_octahedron"]
+        names += ["lbvh_8_moller_trumbore", "lbvh_8_moller_trumbore_octahedron"]
+        self.assertEqual([row.name for row in result.rows], names)
+        self.assertEqual(settings.variants(), len(names))
+        self.assertIn("otherwise than exactly", dict(summary.details(result.rows[2]))[""])
+        cell = summary.cells(result.rows[2], "primary", None)["WRONG"]
+        self.assertRegex(cell, r"^\d+( \(\d+\))?$")
+        self.assertEqual(summary.short_title(result.rows[3]), "LBVH 8 MT sorted")
         self.assertEqual(result.subject.geometry, "render")
         self.assertEqual(self.study().pictures, {})
 
@@ -102,6 +112,13 @@ class Compare(EmptySceneTest):
         settings.use_2 = settings.use_4 = settings.use_8 = False
         with self.assertRaisesRegex(RuntimeError, "at least one builder"):
             bpy.ops.bvhlab.compare()
+        settings.use_2, settings.layout_full = True, False  # compressed nodes are 8-wide
+        with self.assertRaisesRegex(RuntimeError, "compressed nodes need the branching factor 8"):
+            bpy.ops.bvhlab.compare()
+        settings.use_8 = True
+        self.assertEqual(settings.variants(), len(SWITCHED_ON))
+        settings.preset = "paper"
+        self.assertEqual(settings.plan().layouts, ["full"])
 
     def test_empty_scene_is_one_sentence(self) -> None:
         bpy.data.objects["Cube"].hide_set(True)
@@ -150,8 +167,8 @@ class Compare(EmptySceneTest):
         best = summary.fastest(result.rows, "primary")
         self.assertEqual(best.system, "bvh_lab")
         said = summary.winner(result.rows, "primary")
-        self.assertRegex(said[0], r"^Fastest: .*-wide, 0 wrong hits of \d+$")
-        pictures = f"All {3 * len(SWITCHED_ON)} pictures are equal, pixel for pixel"
+        self.assertRegex(said[0], r"^Fastest: .*-wide( compressed)?, 0 wrong hits of \d+$")
+        pictures = f"All {4 * len(SWITCHED_ON)} pictures are equal, pixel for pixel"
         self.assertEqual(summary.pictures(result), pictures)
         self.assertEqual(summary.cells(best, "primary", best)["RATIO"], "1.00×")
 

@@ -189,6 +189,71 @@ class Instances(EmptySceneTest):
         self.assertEqual(len(self.extract().triangles), 12 * 4)
 
 
+class TenThousand(EmptySceneTest):
+    """Instances of each kind are the same triangles as as many objects."""
+
+    PLACES = tuple((3.0 * (i % 100), 3.0 * (i // 100), 0.0) for i in range(10_000))
+
+    def check(self, scene, beside: int = 0) -> None:
+        """All cubes are there, each where it should be; ``beside``: triangles of other objects."""
+        self.assertEqual(len(scene.triangles) - beside, 12 * len(self.PLACES))
+        cubes = scene.vertices[: 8 * len(self.PLACES)].reshape(-1, 8, 3)
+        centres = cubes.mean(axis=1)
+        order = np.lexsort((centres[:, 0], centres[:, 1]))
+        np.testing.assert_array_equal(centres[order], np.array(self.PLACES, np.float32))
+        corners = cubes - centres[:, None]
+        np.testing.assert_array_equal(corners, np.broadcast_to(corners[0], corners.shape))
+
+    def test_objects_and_collection_instances(self) -> None:
+        cube = add_cube()
+        for place in self.PLACES[1:]:
+            copy = link(cube.copy())
+            copy.location = place
+        real = self.extract()
+        self.check(real)
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        collection = bpy.data.collections.new("Parts")
+        cube = add_cube()
+        bpy.context.scene.collection.objects.unlink(cube)
+        collection.objects.link(cube)
+        for place in self.PLACES:
+            empty = link(bpy.data.objects.new("Instance", None))
+            empty.instance_type, empty.instance_collection = "COLLECTION", collection
+            empty.location = place
+        instanced = self.extract()
+        self.check(instanced)
+        np.testing.assert_array_equal(_sorted(instanced), _sorted(real))
+        self.assertEqual(len(instanced.triangles), len(real.triangles))
+
+    def test_geometry_nodes(self) -> None:
+        child = add_cube("Instanced")
+        child.hide_set(True)
+        host = add_mesh("Host", list(self.PLACES), [])
+        host.modifiers.new("Nodes", "NODES").node_group = _instance_on_points(child)
+        self.check(self.extract())
+
+    def test_particles(self) -> None:
+        child = add_cube("Particle")
+        child.hide_set(True)
+        bpy.ops.mesh.primitive_grid_add(x_subdivisions=100, y_subdivisions=100, size=300)
+        grid = bpy.context.object
+        grid.modifiers.new("Particles", "PARTICLE_SYSTEM")
+        settings = grid.particle_systems[0].settings
+        settings.count, settings.frame_start, settings.frame_end = len(self.PLACES), 1, 1
+        settings.lifetime, settings.physics_type = 500, "NO"
+        settings.emit_from, settings.use_emit_random = "FACE", False
+        settings.render_type, settings.instance_object = "OBJECT", child
+        settings.particle_size = 0.1
+        bpy.context.scene.frame_set(2)
+        scene = self.extract()
+        self.assertEqual(len(scene.triangles), 2 * 100 * 100 + 12 * len(self.PLACES))
+        self.assertIn("10001 objects and instances, 2 distinct", scene.notes[0])
+
+
+def _sorted(scene) -> np.ndarray:
+    return scene.vertices[np.lexsort(scene.vertices.T)]
+
+
 def _instance_on_points(child: bpy.types.Object) -> bpy.types.NodeTree:
     tree = bpy.data.node_groups.new("Instances", "GeometryNodeTree")
     if hasattr(tree, "interface"):  # Blender 4.0

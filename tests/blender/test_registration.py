@@ -9,6 +9,7 @@ import sys
 import tempfile
 import threading
 import unittest
+from collections.abc import Callable
 from pathlib import Path
 from unittest import mock
 
@@ -28,26 +29,58 @@ def left_behind() -> list[str]:
             found.append(f"{owner.__name__}.bvh_lab")
     if hasattr(bpy.types.Scene, "bvh_lab_render"):
         found.append("Scene.bvh_lab_render")
-    found += [
-        f"handler {handler}" for handler in bpy.app.handlers.load_pre if "bvh" in repr(handler)
-    ]
+    for name in dir(bpy.app.handlers):
+        handlers = getattr(bpy.app.handlers, name)
+        if isinstance(handlers, list):
+            found += [f"handler {name}" for each in handlers if "bvh_lab" in each.__module__]
+    keys = bpy.context.window_manager.keyconfigs.addon
+    for keymap in keys.keymaps if keys else ():
+        found += [item.idname for item in keymap.keymap_items if "bvhlab" in item.idname]
     found += [thread.name for thread in threading.enumerate() if "bvh_lab" in thread.name]
     return found
+
+
+def native_threads() -> int:
+    """Threads of this process, in whichever language."""
+    return len(list(Path("/proc/self/task").iterdir()))
+
+
+def start_viewport_and_study() -> Callable[[], float | None]:
+    """Both at work, as in the middle of a session; returns the viewport's timer."""
+    from bvh_lab.blender import store, viewport
+    from bvh_lab.blender.extract import extract_scene
+    from bvh_lab.study.job import Job
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    add_cube()
+    scene = bpy.context.scene
+    scene.bvh_lab.repeats = 1000
+    store.start(scene, Job(extract_scene(bpy.context), scene.bvh_lab.plan(), "test"), 1)
+    viewport.start(type("Engine", (), {}))  # of which only is asked whether it is still there
+    (timer,) = viewport._timers
+    return timer
 
 
 class Registration(unittest.TestCase):
     def tearDown(self) -> None:
         self.assertEqual(left_behind(), [])
 
-    def test_three_times(self) -> None:
+    def test_ten_times(self) -> None:
         import bvh_lab
 
-        for _ in range(3):
+        threads = []
+        for _ in range(10):
             bvh_lab.register()
             self.assertIn("BVHLAB_PT_compare", left_behind())
             self.assertIn("Scene.bvh_lab", left_behind())
+            self.assertIn("handler load_pre", left_behind())
+            timer = start_viewport_and_study()
+            self.assertTrue(bpy.app.timers.is_registered(timer))
             bvh_lab.unregister()
             self.assertEqual(left_behind(), [])
+            self.assertFalse(bpy.app.timers.is_registered(timer))
+            threads.append(native_threads())
+        self.assertLessEqual(threads[-1], threads[1])  # oneTBB's own stay, as many as there were
 
     def test_a_failure_is_undone(self) -> None:
         import bvh_lab

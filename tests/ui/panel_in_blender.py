@@ -16,11 +16,12 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from ui_support import BUILD, play, screenshot, seen, wait_for, window_region
+from ui_support import BUILD, play, screenshot, scroll_to_end, seen, wait_for, window_region
 
 sys.path.insert(0, str(BUILD))
 import bvh_lab
-from bvh_lab.blender import store, summary
+from bvh_lab.blender import panels, store, summary
+from bvh_lab.study.precision import BOX_TESTS, TRIANGLE_TESTS
 
 
 def prepare() -> None:
@@ -73,16 +74,6 @@ def find_button(area: bpy.types.Area, command: str, share: float = 0.5) -> Itera
     raise AssertionError(f"no button runs {command}")
 
 
-def scroll_to_end(area: bpy.types.Area) -> Iterator[None]:
-    region = window_region(area)
-    for _ in range(3):
-        with bpy.context.temp_override(window=bpy.context.window, area=area, region=region):
-            if bpy.ops.view2d.scroll_down.poll():
-                bpy.ops.view2d.scroll_down(deltay=2000)
-        area.tag_redraw()
-        yield
-
-
 def steps() -> Iterator[None]:
     image_editor, properties = split_screen()
     for _ in range(10):  # the editor knows its tabs once it was drawn
@@ -131,11 +122,66 @@ def steps() -> Iterator[None]:
     yield from scroll_to_end(properties)
     yield from screenshot("4_results.png")
 
-    position = yield from find_button(properties, "column='BUILD'", 0.38)
+    position = yield from find_button(properties, "column='BUILD'", 0.46)
     click(*position)
     panel = bpy.context.window_manager.bvh_lab
     yield from wait_for("the table is sorted by build time", lambda: panel.sort_column == "BUILD")
     yield from screenshot("5_sorted.png")
+    yield from precision_steps(properties)
+
+
+def open_panels(*closed: type[bpy.types.Panel]) -> list[type[bpy.types.Panel]]:
+    """Show the contents of panels that are closed at first: no call of Blender opens one."""
+    opened = []
+    for order, panel in enumerate(closed):
+        shown = type(
+            f"BVHLAB_PT_shown_{order}",
+            (panels.RenderPanel, bpy.types.Panel),
+            {"bl_label": f"{panel.bl_label}, opened", "bl_order": order, "draw": panel.draw},
+        )
+        bpy.utils.register_class(shown)
+        opened.append(shown)
+    return opened
+
+
+def precision_steps(properties: bpy.types.Area) -> Iterator[None]:
+    """All layouts and tests of one tree."""
+    settings = bpy.context.scene.bvh_lab
+    for builder in settings.builders():
+        setattr(settings, f"use_{builder}", builder == "lbvh")
+    settings.use_2 = settings.use_4 = settings.embree = False
+    for name in TRIANGLE_TESTS:
+        setattr(settings, f"triangle_{name}", True)
+    for name in BOX_TESTS:
+        setattr(settings, f"box_{name}", True)
+    seen["precise_variants"] = settings.variants()
+    yield
+    position = yield from find_button(properties, "bpy.ops.bvhlab.compare")
+    click(*position)
+    yield from wait_for("the precise comparison runs", lambda: store.running is not None)
+    yield from wait_for("it ends", lambda: store.running is None)
+    study = store.study_of(bpy.context.scene)
+    rows = study.result.rows
+    seen["precise_rows"] = [row.name for row in rows]
+    seen["precise_titles"] = [summary.short_title(row) for row in rows]
+    seen["precise_failures"] = [row.error for row in study.result.failed()]
+    seen["precise_pictured"] = sorted({name for name, _ in study.pictures})
+    bpy.context.window_manager.bvh_lab.select(store.scene_key(bpy.context.scene), rows[-1].name)
+    yield from scroll_to_end(properties)
+    yield from screenshot("6_precision.png")
+    opened = open_panels(
+        panels.BVHLAB_PT_advanced, panels.BVHLAB_PT_settings, panels.BVHLAB_PT_details
+    )
+    for _ in range(3):  # back to the top
+        region = window_region(properties)
+        with bpy.context.temp_override(window=bpy.context.window, area=properties, region=region):
+            if bpy.ops.view2d.scroll_up.poll():
+                bpy.ops.view2d.scroll_up(deltay=2000)
+        properties.tag_redraw()
+        yield
+    yield from screenshot("7_settings.png")
+    for panel in opened:
+        bpy.utils.unregister_class(panel)
 
 
 prepare()

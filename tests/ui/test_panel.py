@@ -42,7 +42,8 @@ def test_escape_stops_and_keeps_rows(seen: dict) -> None:
 
 
 def test_table_holds_every_variant(seen: dict) -> None:
-    ours = [f"{builder}_{k}" for builder in SWITCHED_ON for k in (2, 4, 8)]
+    widths = ("2", "4", "8", "8_cwbvh")
+    ours = [f"{builder}_{width}" for builder in SWITCHED_ON for width in widths]
     assert [name for name in seen["rows"] if not name.startswith("embree")] == ours
     assert seen["failures"] == []
 
@@ -57,6 +58,14 @@ def test_winner_is_said_with_its_error(seen: dict) -> None:
     assert "wrong hits of" in seen["said"][0]
 
 
+def test_precision_is_chosen_in_the_panel(seen: dict) -> None:
+    assert seen["precise_variants"] == 2 * 4 * 2  # two layouts, four triangle and two box tests
+    assert len(seen["precise_rows"]) == 16 and seen["precise_failures"] == []
+    assert seen["precise_titles"][:3] == ["LBVH 8", "LBVH 8 plain", "LBVH 8 MT"]
+    assert seen["precise_titles"][-1] == "LBVH 8c BW plain"
+    assert seen["precise_pictured"] == ["lbvh_8", "lbvh_8_cwbvh"]
+
+
 def test_picture_is_in_the_image_editor(seen: dict) -> None:
     name, width, height = seen["image"]
     assert name == "BVH Lab Camera"
@@ -65,4 +74,4 @@ def test_picture_is_in_the_image_editor(seen: dict) -> None:
 
 def test_screenshots(seen: dict) -> None:
     pictures = sorted(path.name for path in seen["folder"].glob("*.png"))
-    assert [name[0] for name in pictures] == ["1", "2", "3", "4", "5"]
+    assert [name[0] for name in pictures] == ["1", "2", "3", "4", "5", "6", "7"]

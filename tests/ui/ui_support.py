@@ -17,7 +17,9 @@ from pathlib import Path
 
 import bpy
 
-BUILD, OUT = (Path(word) for word in sys.argv[sys.argv.index("--") + 1 :])
+_WORDS = sys.argv[sys.argv.index("--") + 1 :]
+BUILD, OUT = Path(_WORDS[0]), Path(_WORDS[1])
+REST = _WORDS[2:]  # what a script has to do, where it can do several things
 
 TICK_SECONDS = 0.03
 PATIENCE_SECONDS = 120.0
@@ -41,6 +43,17 @@ def screenshot(name: str) -> Iterator[None]:
 
 def window_region(area: bpy.types.Area) -> bpy.types.Region:
     return next(region for region in area.regions if region.type == "WINDOW")
+
+
+def scroll_to_end(area: bpy.types.Area) -> Iterator[None]:
+    """Show the last panels of an area, which are ours."""
+    region = window_region(area)
+    for _ in range(3):
+        with bpy.context.temp_override(window=bpy.context.window, area=area, region=region):
+            if bpy.ops.view2d.scroll_down.poll():
+                bpy.ops.view2d.scroll_down(deltay=2000)
+        area.tag_redraw()
+        yield
 
 
 def play(script: Iterator[None], at_the_end: Callable[[], None]) -> None:

@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +17,12 @@ BLENDER = shutil.which("blender", path="/usr/bin")
 
 
 def what_blender_saw(
-    script: str, folder: Path, width: int, height: int, *options: str
+    script: str, folder: Path, width: int, height: int, *options: str, words: Sequence[str] = ()
 ) -> dict[str, Any]:
     """Run the script beside this file and return its seen.json; "folder" holds its screenshots.
 
-    The window is ``width`` x ``height`` pixels; ``options`` go to Blender. A script that failed
+    The window is ``width`` x ``height`` pixels; ``options`` go to Blender, ``words`` to the script.
+    A script that failed
     fails the test with its traceback.
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -28,7 +30,14 @@ def what_blender_saw(
     command = ["xvfb-run", "-a", "-s", f"-screen 0 {width}x{height}x24", str(BLENDER)]
     command += ["--factory-startup", "-noaudio", *options]
     command += ["--window-geometry", "0", "0", str(width), str(height), "--python-exit-code", "1"]
-    command += ["--python", str(Path(__file__).with_name(script)), "--", str(BUILD), str(folder)]
+    command += [
+        "--python",
+        str(Path(__file__).with_name(script)),
+        "--",
+        str(BUILD),
+        str(folder),
+        *words,
+    ]
     environment = {
         **os.environ,
         "LIBGL_ALWAYS_SOFTWARE": "1",
