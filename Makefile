@@ -5,12 +5,17 @@ SCENE ?= blender_scenes/atrium.blend
 ARGS ?=
 BLENDER := /usr/bin/blender --background
 PYTHON := PYTHONPATH=build .venv/bin/python
-CPP_FILES = find native tests/native -name '*.h' -o -name '*.cpp'
+CPP_FILES = find native tests/native tests/fuzz tests/sanitize -name '*.h' -o -name '*.cpp'
+
+# The same files in every run of the tests; `make fuzz` takes others.
+FUZZ_CORE = build-sanitize/fuzz_core -max_len=512 -timeout=60 -rss_limit_mb=4096 -artifact_prefix=out/fuzz/
+SECONDS_A_TARGET ?= 60
+SEED ?= $(shell date +%s)
 
 export SCENE
 .NOTPARALLEL:
 .PHONY: help setup build compare test lint test-native test-python test-bpy test-blender test-ui \
-	format test-scenes bench bench-cycles study paper zip scenes clean check-scene
+	test-sanitize test-fuzz fuzz format test-scenes bench bench-cycles study stability paper zip scenes clean check-scene
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-13s %s\n", $$1, $$2}' Makefile
@@ -30,7 +35,7 @@ compare: check-scene build ## compare BVHs on SCENE=file (.blend, .npz, .obj, .p
 check-scene:
 	$(if $(shell test -f "$(SCENE)" && echo yes),,$(error no such scene file: $(SCENE)))@:
 
-test: lint test-native test-python test-bpy test-blender test-ui ## run every test, fast ones first; stops at the first layer that fails
+test: lint test-native test-python test-bpy test-blender test-ui test-sanitize test-fuzz ## run every test, fast ones first; stops at the first layer that fails
 
 lint: build ## check format, style and types
 	@$(CPP_FILES) | xargs .venv/bin/clang-format --dry-run -Werror
@@ -53,6 +58,24 @@ test-blender: build ## the same tests in Debian's Blender
 test-ui: build ## tests of the panel in a Blender with a window (Xvfb)
 	@$(PYTHON) -m pytest tests/ui
 
+test-sanitize: setup ## the C++ tests under address, undefined behaviour and thread sanitizer
+	@for preset in sanitize sanitize-thread; do \
+		cmake --preset $$preset --log-level=WARNING && cmake --build --preset $$preset && \
+		ctest --test-dir build-$$preset --parallel 2 --no-tests=error --output-on-failure --timeout 600 || exit 1; done
+
+test-fuzz: build ## read mutated files and build trees of random bytes, the same in every run
+	@cmake --preset sanitize --log-level=WARNING && cmake --build --preset sanitize --target fuzz_core
+	@rm -rf out/fuzz/first && mkdir -p out/fuzz/first
+	@$(FUZZ_CORE) -seed=1 -runs=20000 -max_total_time=60 out/fuzz/first tests/fuzz/corpus/core >out/fuzz/core.log 2>&1 || \
+		{ tail -n 60 out/fuzz/core.log; echo "make test-fuzz: the bytes are in out/fuzz/"; exit 1; }
+	@echo "core: $$(tail -n 1 out/fuzz/core.log)"
+	@$(PYTHON) tests/fuzz/fuzz_files.py --runs 500 --seconds 20
+
+fuzz: build ## the same with new bytes, SECONDS_A_TARGET=60 for each target, SEED=number
+	@cmake --preset sanitize --log-level=WARNING && cmake --build --preset sanitize --target fuzz_core
+	@mkdir -p out/fuzz/core && $(FUZZ_CORE) -seed=$(SEED) -max_total_time=$(SECONDS_A_TARGET) out/fuzz/core tests/fuzz/corpus/core
+	@$(PYTHON) tests/fuzz/fuzz_files.py --seed $(SEED) --seconds $(SECONDS_A_TARGET)
+
 test-scenes: build ## the test that all variants agree, with a million rays in each of ../shared/scenes (an hour or two)
 	@BVHLAB_TEST_ALL=1 BVHLAB_TEST_RAYS=1000000 $(PYTHON) -m pytest --timeout 0 tests/python/test_core_scenes.py
 
@@ -70,6 +93,9 @@ bench-cycles: build ## the last part of bench alone, with ARGS="--resolution 320
 
 study: build ## the paper's tables and figures from blender_scenes/ into out/study, with ARGS="--builders lbvh,sah"
 	@$(PYTHON) scripts/study.py --out out/study $(ARGS)
+
+stability: build ## errors and speed of all precision choices on hard cases into out/stability (a quarter of an hour; ARGS="--quick")
+	@$(PYTHON) scripts/stability.py --out out/stability $(ARGS)
 
 paper: check-scene build ## compare costs with the paper's on SCENE=file (.npz, .obj, .ply) into out/paper, with ARGS="--metrics"
 	@$(PYTHON) scripts/paper.py "$$SCENE" --out out/paper $(ARGS)

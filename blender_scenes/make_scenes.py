@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-r"""Make BVH Lab's scenes: atrium, hairball and city.
+r"""Make BVH Lab's scenes: atrium, hairball, city and hard_cases.
 
     blender -b --factory-startup --python-exit-code 1 \
         --python blender_scenes/make_scenes.py -- atrium
@@ -20,7 +20,8 @@ from pathlib import Path
 import bpy
 
 FOLDER = Path(__file__).resolve().parent
-SCENES = ("atrium", "hairball", "city")
+SCENES = ("atrium", "hairball", "city")  # those that `make study` takes
+EVERY_SCENE = (*SCENES, "hard_cases")
 DEFAULT_STRANDS = 2000
 MAXIMUM_STRANDS = 100_000
 
@@ -75,7 +76,7 @@ def strand_count(text: str) -> int:
 def arguments(argv: list[str]) -> argparse.Namespace:
     """Parse the arguments after Blender's own."""
     parser = argparse.ArgumentParser(prog="make_scenes.py", description="Make BVH Lab's scenes.")
-    parser.add_argument("scene", nargs="?", default="atrium", choices=(*SCENES, "all"))
+    parser.add_argument("scene", nargs="?", default="atrium", choices=(*EVERY_SCENE, "all"))
     parser.add_argument(
         "--out", type=Path, default=FOLDER, help="folder for the .blend files, made where missing"
     )
@@ -93,7 +94,7 @@ def main() -> int:
     else:
         argv = sys.argv[1:] if getattr(bpy.app, "module", False) else []
     wanted = arguments(argv)
-    for name in SCENES if wanted.scene == "all" else (wanted.scene,):
+    for name in EVERY_SCENE if wanted.scene == "all" else (wanted.scene,):
         path = wanted.out.resolve() / f"{name}.blend"
         make(name, wanted.strands)
         try:

@@ -12,8 +12,6 @@ import pytest
 from builder_params import ANNEALING, fast_params
 from bvh_lab.native import core
 from bvh_lab.study.plan import BUILDERS
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 TRIANGLE = (np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], dtype=np.uint32))
 
@@ -230,41 +228,3 @@ def test_builders_and_devices_say_what_there_is() -> None:
     devices = {entry["id"]: entry for entry in core.devices()}
     assert devices["cpu"]["available"] and devices["cpu"]["threads"] >= 1
     assert not devices["opencl"]["available"] and devices["opencl"]["reason"]
-
-
-coordinates = st.floats(-100, 100, width=32) | st.sampled_from([0.0, -0.0, 1.0, 1e-30, 1e18])
-
-
-@settings(max_examples=200, deadline=None)
-@given(data=st.data())
-def test_hits_of_any_small_mesh_equal_brute_force(data: st.DataObject) -> None:
-    count = data.draw(st.integers(1, 8), "triangles")
-    flat = data.draw(st.lists(coordinates, min_size=9 * count, max_size=9 * count), "corners")
-    vertices = np.array(flat, np.float32).reshape(-1, 3)
-    mesh = core.Mesh(vertices, np.arange(3 * count, dtype=np.uint32).reshape(-1, 3))
-    origin = data.draw(st.lists(coordinates, min_size=3, max_size=3), "origin")
-    target = vertices[data.draw(st.integers(0, 3 * count - 1), "aimed at vertex")]
-    direction = target - np.array(origin, np.float32)
-    if not np.isfinite(direction).all() or not direction.any():
-        direction = np.array([0, 0, 1], np.float32)
-    judge = core.brute_force(mesh, [origin], [direction])
-    first = None
-    for builder in [entry["id"] for entry in core.builders()]:
-        for branching in (2, 4, 8):
-            bvh = core.build(mesh, builder, branching, params=fast_params(builder))
-            bvh.validate()
-            hit = core.trace(bvh, [origin], [direction])
-            answer = (hit.triangle[0], hit.t.tobytes(), hit.u.tobytes(), hit.v.tobytes())
-            first = first or answer
-            assert answer == first, "the variants disagree"
-            any_hit = core.trace(bvh, [origin], [direction], any_hit=True)
-            assert any_hit.occluded[0] == hit.occluded[0]
-    # Whether the line meets a triangle is decided exactly, at any scale; whether it does so before
-    # or behind the origin only but for the rounding of t.
-    size = max(1e-38, float(np.abs([*flat, *origin]).max()))
-    margin = 1e-12 * size / float(np.abs(direction).max())
-    if hit.occluded[0] and not judge.occluded[0]:
-        behind = core.brute_force(mesh, [origin], [-direction])
-        assert behind.occluded[0] and behind.t[0] <= margin
-    elif judge.occluded[0] and not hit.occluded[0]:
-        assert judge.t[0] <= margin
