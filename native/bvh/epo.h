@@ -17,7 +17,9 @@ namespace bvhlab {
 ///
 /// Areas are exact up to the rounding of double: each triangle is clipped to each box that it
 /// reaches into. Boxes are closed, as they are for rays, so a triangle in the common face of two
-/// boxes lies in both. A triangle is in Q(n) as a whole as soon as one leaf below n refers to it:
+/// boxes lies in both. Decoded boxes of compressed nodes stick out of their parents' by the
+/// coarseness of the grid: box(n) is then what rays can reach, its common part with the boxes above
+/// it. A triangle is in Q(n) as a whole as soon as one leaf below n refers to it:
 /// that a spatial split put other parts elsewhere does not count as overlap. Triangles that lie in
 /// one place count each. 0 where the scene has no area.
 ///

@@ -69,10 +69,11 @@ long double area_inside(const Triangle& triangle, const Box& box) {
     return std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]) / 2;
 }
 
-/// Adds C_n times the outside area of every node below `node`; returns the triangles below it.
+/// Adds C_n times the outside area of every node below `node`, of whose box rays reach `reach`;
+/// returns the triangles below it.
 template <class Tree>
 std::set<std::uint32_t> add_overlaps(const Mesh& mesh, const Tree& wide, std::uint32_t node,
-                                     const CostModel& model, long double& sum) {
+                                     const Box& reach, const CostModel& model, long double& sum) {
     constexpr unsigned K = Tree::branching;
     constexpr unsigned group = K == 2 || std::is_same_v<Tree, CompressedBvh> ? 1 : K;
     std::set<std::uint32_t> all;
@@ -80,15 +81,16 @@ std::set<std::uint32_t> add_overlaps(const Mesh& mesh, const Tree& wide, std::ui
     for (unsigned i = 0; i < K && !parent.is_missing(i); ++i) {
         std::set<std::uint32_t> own;
         long double work = model.traversal;
+        const Box box = intersect(parent.box(i), reach);
         if (parent.is_leaf(i)) {
             for (std::uint32_t lane = 0; lane < parent.count[i]; ++lane)
                 own.insert(wide.reference(parent.child[i], lane));
             work = model.intersection * double((parent.count[i] + group - 1) / group * group);
         } else {
-            own = add_overlaps(mesh, wide, parent.child[i], model, sum);
+            own = add_overlaps(mesh, wide, parent.child[i], box, model, sum);
         }
         for (std::uint32_t t = 0; t < mesh.size(); ++t)
-            if (!own.contains(t)) sum += work * area_inside(mesh.triangle(t), parent.box(i));
+            if (!own.contains(t)) sum += work * area_inside(mesh.triangle(t), box);
         all.insert(own.begin(), own.end());
     }
     return all;
@@ -97,7 +99,8 @@ std::set<std::uint32_t> add_overlaps(const Mesh& mesh, const Tree& wide, std::ui
 double brute_epo(const Bvh& bvh, const CostModel& model) {
     const Mesh& mesh = *bvh.mesh;
     long double sum = 0, area = 0;
-    std::visit([&](const auto& wide) { add_overlaps(mesh, wide, 0, model, sum); }, bvh.tree);
+    std::visit([&](const auto& wide) { add_overlaps(mesh, wide, 0, mesh.bounds, model, sum); },
+               bvh.tree);
     for (std::size_t t = 0; t < mesh.size(); ++t)
         area += area_inside(mesh.triangle(t), mesh.bounds);
     return double(sum / area);
