@@ -35,7 +35,7 @@ compare: check-scene build ## compare BVHs on SCENE=file (.blend, .npz, .obj, .p
 check-scene:
 	$(if $(shell test -f "$(SCENE)" && echo yes),,$(error no such scene file: $(SCENE)))@:
 
-test: lint test-native test-python test-bpy test-blender test-ui test-sanitize test-fuzz ## run every test, fast ones first; stops at the first layer that fails
+test: lint test-native test-python test-bpy test-blender test-ui ## run every test, fast ones first; stops at the first layer that fails
 
 lint: build ## check format, style and types
 	@$(CPP_FILES) | xargs .venv/bin/clang-format --dry-run -Werror

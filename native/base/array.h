@@ -3,17 +3,38 @@
 
 #include <tbb/cache_aligned_allocator.h>
 
+#include <cstddef>
 #include <memory>
+#include <new>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
 namespace bvhlab {
 
+#ifdef BVHLAB_SANITIZE
+/// Sanitizers see nothing of what happens in oneTBB's own memory: here each array is a block.
+template <class T>
+struct CacheAlignedAllocator {
+    using value_type = T;
+    static constexpr std::align_val_t alignment{128};  // as oneTBB's
+
+    T* allocate(std::size_t count) {
+        if (count > std::size_t(PTRDIFF_MAX) / sizeof(T)) throw std::bad_array_new_length();
+        return static_cast<T*>(::operator new(count * sizeof(T), alignment));
+    }
+    void deallocate(T* block, std::size_t) { ::operator delete(block, alignment); }
+    bool operator==(const CacheAlignedAllocator&) const = default;
+};
+#else
+template <class T>
+using CacheAlignedAllocator = tbb::cache_aligned_allocator<T>;
+#endif
+
 /// Allocator that leaves new elements of trivial type uninitialised: large arrays are first touched
 /// by the threads that fill them, not zeroed by one. Memory is aligned to a cache line.
 template <class T>
-struct UninitialisedAllocator : tbb::cache_aligned_allocator<T> {
+struct UninitialisedAllocator : CacheAlignedAllocator<T> {
     static_assert(std::is_trivially_destructible_v<T>);
 
     UninitialisedAllocator() = default;

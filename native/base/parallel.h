@@ -3,6 +3,8 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+#include <tbb/parallel_reduce.h>
 #include <tbb/partitioner.h>
 #include <tbb/task_arena.h>
 
@@ -10,6 +12,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "base/fork_join.h"
 #include "base/token.h"
 
 namespace bvhlab {
@@ -18,7 +21,8 @@ namespace bvhlab {
 template <class Function>
 decltype(auto) with_threads(int threads, Function&& function) {
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
-    return arena.execute(std::forward<Function>(function));
+    const ForkJoin call;
+    return arena.execute(call.task(std::forward<Function>(function)));
 }
 
 /// Threads that `with_threads(threads, ...)` uses.
@@ -26,17 +30,48 @@ inline int thread_count(int threads) {
     return threads > 0 ? threads : tbb::this_task_arena::max_concurrency();
 }
 
+using IndexRange = tbb::blocked_range<std::size_t>;
+
+/// Calls `body(range)` for parts of [begin, end) of at most `grain` indices, a task each. The
+/// result must not depend on the order of calls.
+template <class Body>
+void parallel_for_ranges(std::size_t begin, std::size_t end, std::size_t grain, const Body& body) {
+    const ForkJoin call;
+    tbb::parallel_for(IndexRange(begin, end, grain),
+                      call.task([&](const IndexRange& range) { body(range); }),
+                      tbb::simple_partitioner());  // others make tasks far larger than the grain
+}
+
 /// Calls `body(i)` for every i in [0, count), at most `grain` indices to a task, checking the token
 /// once a task. The result must not depend on the order of calls.
 template <class Body>
 void parallel_for_each(std::size_t count, std::size_t grain, const Token& token, Body&& body) {
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, count, grain),
-        [&](const tbb::blocked_range<std::size_t>& range) {
-            token.check();
-            for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
-        },
-        tbb::simple_partitioner());  // others make tasks far larger than the grain
+    parallel_for_ranges(0, count, grain, [&](const IndexRange& range) {
+        token.check();
+        for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
+    });
+}
+
+/// Adds up [begin, end): `add(range, sum)` returns `sum` and what the range adds to it, for parts
+/// of at most `grain` indices. Which parts are added to which depends on the arguments alone, so
+/// that floating-point sums are the same at any thread count.
+template <class Sum, class Add>
+Sum parallel_sum(std::size_t begin, std::size_t end, std::size_t grain, const Sum& zero,
+                 const Add& add) {
+    const ForkJoin call;
+    return tbb::parallel_deterministic_reduce(
+        IndexRange(begin, end, grain), zero,
+        call.task([&](const IndexRange& range, Sum sum) { return add(range, sum); }),
+        call.task([](Sum left, Sum right) { return left + right; }));
+}
+
+/// Calls both functions, which may run at the same time. Once another task has thrown, oneTBB
+/// leaves nested calls early and *without* an exception: check the token before the results are
+/// used.
+template <class First, class Second>
+void parallel_invoke(const First& first, const Second& second) {
+    const ForkJoin call;
+    tbb::parallel_invoke(call.task([&] { first(); }), call.task([&] { second(); }));
 }
 
 /// Wall-clock seconds since construction.

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "base/fork_join.h"
 #include "base/token.h"
 
 namespace bvhlab {
@@ -26,8 +27,10 @@ inline std::size_t chunk_count(std::size_t count) {
 template <class Body>
 void parallel_for_within_task(std::size_t count, Body&& body) {
     tbb::task_group_context context(tbb::task_group_context::isolated);
+    const ForkJoin call;
     tbb::this_task_arena::isolate([&] {
-        tbb::parallel_for(std::size_t(0), count, std::size_t(1), body, tbb::auto_partitioner(),
+        tbb::parallel_for(std::size_t(0), count, std::size_t(1),
+                          call.task([&](std::size_t i) { body(i); }), tbb::auto_partitioner(),
                           context);
     });
 }

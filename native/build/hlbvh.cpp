@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "build/hlbvh.h"
 
-#include <tbb/parallel_invoke.h>
-
 #include <algorithm>
 #include <glm/gtc/type_precision.hpp>
 #include <limits>
 #include <numeric>
-#include <ranges>
 #include <span>
 #include <vector>
 
@@ -74,8 +71,9 @@ struct Bin {
 /// Replaces `best` by the plane of least cost on `axis`, if less: the areas of both sides, weighed
 /// by the number of clusters.
 void find_plane(std::span<const Cluster> clusters, int axis, Plane& best) {
-    const auto [low, high] = std::ranges::minmax(
-        clusters | std::views::transform([&](const Cluster& c) { return int(c.cell[axis]); }));
+    const auto cell_of = [&](const Cluster& cluster) { return int(cluster.cell[axis]); };
+    const auto [lowest, highest] = std::ranges::minmax_element(clusters, {}, cell_of);
+    const int low = cell_of(*lowest), high = cell_of(*highest);
     if (low == high) return;
 
     // Fill the bins of the cells low..high.
@@ -141,8 +139,7 @@ struct TopLevels {
             build_left();
             build_right();
         } else {
-            tbb::parallel_invoke(build_left, build_right);
-            // Once another task has thrown, oneTBB leaves nested calls early without an exception.
+            parallel_invoke(build_left, build_right);
             token.check();
         }
         bvh.children[node] = {left, right};

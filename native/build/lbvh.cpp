@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "build/lbvh.h"
 
-#include <tbb/parallel_invoke.h>
-
 #include <bit>
 #include <utility>
 
@@ -47,9 +45,8 @@ std::uint32_t LbvhSubtrees::build(std::uint32_t node, std::uint32_t first,
         right = build(right_node, split + 1, last);
     } else {
         token.check();
-        tbb::parallel_invoke([&] { left = build(node + 1, first, split); },
-                             [&] { right = build(right_node, split + 1, last); });
-        // Once another task has thrown, oneTBB leaves nested calls early without an exception.
+        parallel_invoke([&] { left = build(node + 1, first, split); },
+                        [&] { right = build(right_node, split + 1, last); });
         token.check();
     }
     bvh.children[node] = {left, right};

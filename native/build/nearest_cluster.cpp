@@ -40,8 +40,9 @@ std::uint32_t nearest_of(const ClusterBoxes& boxes, std::uint32_t count, std::ui
                          std::uint32_t i) {
     const Lanes lanes;
     const IndexLanes index_lanes;
-    const auto& [lower_x, lower_y, lower_z] = boxes.lower;
-    const auto& [upper_x, upper_y, upper_z] = boxes.upper;
+    const Array<float>&lower_x = boxes.lower[0], &upper_x = boxes.upper[0];
+    const Array<float>&lower_y = boxes.lower[1], &upper_y = boxes.upper[1];
+    const Array<float>&lower_z = boxes.lower[2], &upper_z = boxes.upper[2];
     const Values own_lower_x = repeat(lower_x, i), own_upper_x = repeat(upper_x, i);
     const Values own_lower_y = repeat(lower_y, i), own_upper_y = repeat(upper_y, i);
     const Values own_lower_z = repeat(lower_z, i), own_upper_z = repeat(upper_z, i);

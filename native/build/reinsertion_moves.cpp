@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "build/reinsertion_moves.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
-
 #include <atomic>
 #include <bit>
 #include <functional>
@@ -91,7 +88,7 @@ void ReinsertionMoves::lock(const ReinsertionTree& tree, Locks locks, bool first
 }
 
 std::size_t ReinsertionMoves::decide(const ReinsertionTree& tree, Locks locks, const Token& token) {
-    const auto decide_range = [&](const tbb::blocked_range<std::size_t>& slots, std::size_t won) {
+    const auto decide_range = [&](const IndexRange& slots, std::size_t won) {
         token.check();
         for (std::size_t slot = slots.begin(); slot < slots.end(); ++slot) {
             if (states_[slot] != State::asks) continue;
@@ -104,8 +101,7 @@ std::size_t ReinsertionMoves::decide(const ReinsertionTree& tree, Locks locks, c
         }
         return won;
     };
-    return tbb::parallel_reduce(tbb::blocked_range<std::size_t>(0, proposals.size(), grain),
-                                std::size_t(0), decide_range, std::plus<>());
+    return parallel_sum(0, proposals.size(), grain, std::size_t(0), decide_range);
 }
 
 std::size_t ReinsertionMoves::make(ReinsertionTree& tree, Locks locks, int rounds,

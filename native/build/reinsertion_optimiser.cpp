@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "build/reinsertion_optimiser.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
@@ -47,18 +45,17 @@ void ReinsertionOptimiser::search_all(Propose&& propose) {
     moves_.proposals[0] = moves_.proposals[1] = {};          // the root, and no node at all
     constexpr std::uint64_t visits_between_checks = 100000;  // about a millisecond
     tbb::enumerable_thread_specific<ReinsertionSearch> searches(tree_);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(1, tree_.pairs.size(), 256),
-                      [&](const tbb::blocked_range<std::size_t>& pairs) {
-                          ReinsertionSearch& search = searches.local();
-                          token_.check();
-                          std::uint64_t next_check = search.visits() + visits_between_checks;
-                          for (std::size_t pair = pairs.begin(); pair < pairs.end(); ++pair) {
-                              propose(search, std::uint32_t(pair), &moves_.proposals[2 * pair]);
-                              if (search.visits() < next_check) continue;
-                              token_.check();
-                              next_check = search.visits() + visits_between_checks;
-                          }
-                      });
+    parallel_for_ranges(1, tree_.pairs.size(), 256, [&](const IndexRange& pairs) {
+        ReinsertionSearch& search = searches.local();
+        token_.check();
+        std::uint64_t next_check = search.visits() + visits_between_checks;
+        for (std::size_t pair = pairs.begin(); pair < pairs.end(); ++pair) {
+            propose(search, std::uint32_t(pair), &moves_.proposals[2 * pair]);
+            if (search.visits() < next_check) continue;
+            token_.check();
+            next_check = search.visits() + visits_between_checks;
+        }
+    });
 }
 
 bool ReinsertionOptimiser::climb(std::uint32_t iteration, std::uint32_t sparsity, int lock_rounds,

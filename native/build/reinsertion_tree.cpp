@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "build/reinsertion_tree.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <atomic>
 #include <functional>
@@ -166,14 +163,13 @@ double cost(const ReinsertionTree& tree, const CostModel& model, const Token& to
     };
     const double root_area = tree.half_area(ReinsertionTree::root);
     if (root_area <= 0.0) return model.traversal;
-    const auto sum = [&](const tbb::blocked_range<std::size_t>& pairs, double areas) {
+    const auto sum = [&](const IndexRange& pairs, double areas) {
         token.check();
         for (std::size_t i = pairs.begin(); i < pairs.end(); ++i)
             areas += weighted_area(tree.pairs[i], 0) + weighted_area(tree.pairs[i], 1);
         return areas;
     };
-    const double below_root = tbb::parallel_deterministic_reduce(
-        tbb::blocked_range<std::size_t>(1, tree.pairs.size(), grain), 0.0, sum, std::plus<>());
+    const double below_root = parallel_sum(1, tree.pairs.size(), grain, 0.0, sum);
     return (weighted_area(tree.pairs[0], 0) + below_root) / root_area;
 }
 

@@ -140,7 +140,7 @@ private:
         if (tasks == 1)
             run_task(0);  // a deep tree has as many levels as nodes
         else
-            tbb::parallel_for(std::size_t(0), tasks, run_task);
+            parallel_for_each(tasks, 1, token, run_task);
     }
 
     Levels levels_;

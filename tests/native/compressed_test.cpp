@@ -272,7 +272,8 @@ Rays rays_at(const Mesh& mesh, std::size_t count) {
 }
 
 bool same_bits(const Array<float>& a, const Array<float>& b) {
-    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
+    return a.size() == b.size() &&
+           (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0);
 }
 
 void expect_same_hits(const BinaryBvh& binary, const std::shared_ptr<const Mesh>& mesh,

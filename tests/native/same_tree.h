@@ -7,12 +7,16 @@
 
 namespace bvhlab::test {
 
+template <class T>
+bool same_bits(const Array<T>& a, const Array<T>& b) {
+    return a.size() == b.size() &&
+           (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
+}
+
 /// Whether two trees are equal bit for bit, node by node.
 inline bool same(const BinaryBvh& a, const BinaryBvh& b) {
-    return a.references == b.references &&
-           std::memcmp(a.children.data(), b.children.data(),
-                       a.children.size() * sizeof(a.children[0])) == 0 &&
-           std::memcmp(a.boxes.data(), b.boxes.data(), a.boxes.size() * sizeof(a.boxes[0])) == 0;
+    return a.references == b.references && same_bits(a.children, b.children) &&
+           same_bits(a.boxes, b.boxes);
 }
 
 }  // namespace bvhlab::test

@@ -16,7 +16,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from ui_support import BUILD, REST, play, screenshot, scroll_to_end, seen, wait_for
+from ui_support import BUILD, REST, override, play, screenshot, scroll_to_end, seen, wait_for
 
 sys.path.insert(0, str(BUILD))
 import bvh_lab
@@ -59,7 +59,7 @@ def new_file() -> Iterator[None]:
     yield
     for area in areas("PROPERTIES"):
         area.spaces.active.context = "RENDER"
-    with bpy.context.temp_override(window=window()):
+    with override(window=window()):
         bpy.ops.mesh.primitive_monkey_add()
     set_up(scene())
     yield
@@ -78,7 +78,7 @@ def set_up(scene: bpy.types.Scene) -> None:
 
 
 def compare(where: bpy.types.Window | None = None) -> Iterator[None]:
-    with bpy.context.temp_override(window=where or window()):
+    with override(window=where or window()):
         bpy.ops.bvhlab.compare("INVOKE_DEFAULT")
     yield from wait_for("it measures", lambda: compares() and len(store.running.rows) >= 2)
 
@@ -97,20 +97,20 @@ def undo_steps() -> Iterator[None]:
     """Undo and redo while a comparison runs, and after it."""
     yield from new_file()
     key = store.scene_key(scene())
-    with bpy.context.temp_override(window=window()):
+    with override(window=window()):
         bpy.ops.ed.undo_push(message="before")
         bpy.context.view_layer.objects.active.location.x = 1.0
         bpy.ops.ed.undo_push(message="moved")
     yield from compare()
     for number, step in enumerate((bpy.ops.ed.undo, bpy.ops.ed.undo, bpy.ops.ed.redo)):
-        with bpy.context.temp_override(window=window()):
+        with override(window=window()):
             step()
         yield
         seen[f"runs_after_undo_{number}"] = compares() and key == store.scene_key(scene())
     yield from see("1_undone.png")
     yield from stop()
     seen["rows_after_undo"] = len(store.rows_of(scene()))
-    with bpy.context.temp_override(window=window()):
+    with override(window=window()):
         bpy.ops.ed.undo()
     yield
     seen["rows_after_later_undo"] = len(store.rows_of(scene()))
@@ -120,7 +120,7 @@ def delete_steps() -> Iterator[None]:
     """All of the scene's data go while it is compared."""
     yield from new_file()
     yield from compare()
-    with bpy.context.temp_override(window=window()):
+    with override(window=window()):
         bpy.ops.object.select_all(action="SELECT")
         bpy.ops.object.delete()
         scene().world = None
@@ -212,7 +212,7 @@ def render_steps() -> Iterator[None]:
 
 
 def undo() -> None:
-    with bpy.context.temp_override(window=window()):
+    with override(window=window()):
         bpy.ops.ed.undo_push(message="before")
         bpy.data.objects["Suzanne"].location.x = 1.0
         bpy.ops.ed.undo_push(message="moved")
@@ -222,7 +222,7 @@ def undo() -> None:
 def delete_scene() -> None:
     """As the button does, which first ends what renders it; a script would crash Blender here."""
     bpy.data.scenes.new("Other")
-    with bpy.context.temp_override(window=window()):
+    with override(window=window()):
         bpy.ops.scene.delete()
 
 
@@ -238,7 +238,7 @@ def window_steps() -> Iterator[None]:
     bpy.ops.wm.window_new()
     second = bpy.context.window_manager.windows[1]
     yield from compare(second)
-    with bpy.context.temp_override(window=second):
+    with bpy.context.temp_override(window=second):  # waits for the thread's end: no gate here
         bpy.ops.wm.window_close()
     for _ in range(5):
         yield

@@ -16,7 +16,16 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from ui_support import BUILD, play, screenshot, scroll_to_end, seen, wait_for, window_region
+from ui_support import (
+    BUILD,
+    override,
+    play,
+    screenshot,
+    scroll_to_end,
+    seen,
+    wait_for,
+    window_region,
+)
 
 sys.path.insert(0, str(BUILD))
 import bvh_lab
@@ -42,7 +51,7 @@ def prepare() -> None:
 def split_screen() -> tuple[bpy.types.Area, bpy.types.Area]:
     area = next(area for area in bpy.context.screen.areas if area.type == "VIEW_3D")
     before = list(bpy.context.screen.areas)
-    with bpy.context.temp_override(area=area, region=area.regions[-1]):
+    with override(area=area, region=area.regions[-1]):
         bpy.ops.screen.area_split(direction="VERTICAL", factor=0.52)
     other = next(area for area in bpy.context.screen.areas if area not in before)
     left, right = sorted((area, other), key=lambda area: area.x)
@@ -66,7 +75,7 @@ def find_button(area: bpy.types.Area, command: str, share: float = 0.5) -> Itera
     for y in range(region.y + region.height - 8, region.y + 4, -16):
         move_mouse(x, y)
         yield
-        with bpy.context.temp_override(window=bpy.context.window, area=area, region=region):
+        with override(window=bpy.context.window, area=area, region=region):
             if bpy.ops.ui.copy_python_command_button.poll():
                 bpy.ops.ui.copy_python_command_button()
                 if command in bpy.context.window_manager.clipboard:
@@ -174,7 +183,7 @@ def precision_steps(properties: bpy.types.Area) -> Iterator[None]:
     )
     for _ in range(3):  # back to the top
         region = window_region(properties)
-        with bpy.context.temp_override(window=bpy.context.window, area=properties, region=region):
+        with override(window=bpy.context.window, area=properties, region=region):
             if bpy.ops.view2d.scroll_up.poll():
                 bpy.ops.view2d.scroll_up(deltay=2000)
         properties.tag_redraw()

@@ -16,7 +16,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from ui_support import BUILD, REST, play, seen, wait_for
+from ui_support import BUILD, REST, override, play, seen, wait_for
 
 sys.path.insert(0, str(BUILD))
 import bvh_lab
@@ -32,7 +32,7 @@ def steps() -> Iterator[None]:
     yield
     if "compare" in REST:
         scene.bvh_lab.repeats = 1000
-        with bpy.context.temp_override(window=window):
+        with override(window=window):
             bpy.ops.bvhlab.compare("INVOKE_DEFAULT")
         yield from wait_for("it measures", lambda: len(store.running.rows) >= 2)
     if "render" in REST:

@@ -10,9 +10,11 @@ from __future__ import annotations
 import json
 import os
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
@@ -34,6 +36,70 @@ def wait_for(what: str, condition: Callable[[], bool]) -> Iterator[None]:
         yield
 
 
+class Gate:
+    """Holds up our threads before their next call into the native module."""
+
+    def __init__(self) -> None:
+        self._open = threading.Event()
+        self._open.set()
+        self._parked: set[int] = set()
+
+    def guard(self, function: Callable[..., object]) -> Callable[..., object]:
+        """``function``, which waits at the gate if it is called by a thread of ours."""
+
+        def guarded(*arguments: object, **named: object) -> object:
+            if threading.current_thread() is not threading.main_thread():
+                self._parked.add(threading.get_ident())
+                self._open.wait()
+                self._parked.discard(threading.get_ident())
+            return function(*arguments, **named)
+
+        return guarded
+
+    @contextmanager
+    def closed(self) -> Iterator[None]:
+        """All threads of ours are parked (or busy with something else for two seconds)."""
+        self._open.clear()
+        end = time.monotonic() + 2.0
+        while time.monotonic() < end and any(
+            thread.ident not in self._parked
+            for thread in threading.enumerate()
+            if "bvh_lab" in thread.name
+        ):
+            time.sleep(0.001)
+        try:
+            yield
+        finally:
+            self._open.set()
+
+
+_gates: list[Gate] = []
+
+
+@contextmanager
+def override(**members: object) -> Iterator[None]:
+    """bpy.context.temp_override while no other thread runs Python.
+
+    An operator that Python calls lets go of the interpreter's lock, and then looks members up in
+    the override's dictionary. Before Python 3.12, Blender (PyC_IsInterpreterActive) takes the lock
+    for that only if *no* thread has it: if one of ours does, two threads change Python's heap at
+    once, and Blender crashes in either. The add-on itself overrides no context.
+    """
+    if not _gates and "bvh_lab.native" in sys.modules:
+        from bvh_lab.native import core
+
+        gate = Gate()
+        core.trace = gate.guard(core.trace)
+        core.Renderer.render = gate.guard(core.Renderer.render)
+        _gates.append(gate)
+    if not _gates:
+        with bpy.context.temp_override(**members):
+            yield
+        return
+    with _gates[0].closed(), bpy.context.temp_override(**members):
+        yield
+
+
 def screenshot(name: str) -> Iterator[None]:
     for _ in range(8):  # let the window be drawn
         yield
@@ -49,7 +115,7 @@ def scroll_to_end(area: bpy.types.Area) -> Iterator[None]:
     """Show the last panels of an area, which are ours."""
     region = window_region(area)
     for _ in range(3):
-        with bpy.context.temp_override(window=bpy.context.window, area=area, region=region):
+        with override(window=bpy.context.window, area=area, region=region):
             if bpy.ops.view2d.scroll_down.poll():
                 bpy.ops.view2d.scroll_down(deltay=2000)
         area.tag_redraw()

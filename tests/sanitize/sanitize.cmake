@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# How library and tests are compiled for BVHLAB_SANITIZE, a list such as "address,undefined".
+# Clang only: its libFuzzer stands on the same build, and it can leave files uninstrumented.
+if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+  message(FATAL_ERROR "BVHLAB_SANITIZE needs Clang, and this is ${CMAKE_CXX_COMPILER_ID}: "
+                      "configure with the presets sanitize or sanitize-thread")
+endif()
+set(sanitize_flags -fsanitize=${BVHLAB_SANITIZE} -fno-sanitize-recover=all)
+add_link_options(${sanitize_flags})
+add_compile_options(${sanitize_flags} -fno-omit-frame-pointer -gline-tables-only
+                    -fsanitize-ignorelist=${CMAKE_CURRENT_LIST_DIR}/ignore.txt)
+add_compile_definitions(BVHLAB_SANITIZE _GLIBCXX_ASSERTIONS)
+
+# One instruction set instead of all that Highway knows: a fourth of the time to compile.
+file(STRINGS /proc/cpuinfo has_avx2 REGEX "avx2.*bmi2|bmi2.*avx2" LIMIT_COUNT 1)
+add_compile_definitions(HWY_COMPILE_ONLY_STATIC)
+if(has_avx2)
+  add_compile_options(-march=haswell)
+endif()
+
+# Others' headers, compiled once. ccache can do so only if told that times do not matter.
+set(precompiled_headers <algorithm> <array> <atomic> <cmath> <filesystem> <functional> <memory>
+    <numeric> <random> <stdexcept> <string> <vector> <glm/glm.hpp> <tbb/blocked_range.h>
+    <tbb/enumerable_thread_specific.h> <tbb/parallel_for.h> <tbb/parallel_invoke.h>
+    <tbb/parallel_reduce.h> <tbb/task_arena.h>)
+add_compile_options(-Xclang -fno-pch-timestamp)
+if(CMAKE_CXX_COMPILER_LAUNCHER)
+  list(PREPEND CMAKE_CXX_COMPILER_LAUNCHER env CCACHE_SLOPPINESS=pch_defines,time_macros)
+endif()
+
+# The traversals take half of the whole time to compile: their local variables are not watched, nor
+# do those that are only there to be compared with guide the fuzzer. What they read and write is.
+if(BVHLAB_SANITIZE MATCHES "address")
+  file(GLOB traversals CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/native/trace/traverse_*.cpp)
+  foreach(traversal IN LISTS traversals)
+    set(lighter -mllvm -asan-stack=0 -fno-sanitize-address-use-after-scope)
+    if(BVHLAB_WITH_FUZZ AND NOT traversal MATCHES "traverse_watertight.cpp$")
+      list(APPEND lighter -fno-sanitize=fuzzer-no-link)
+    endif()
+    set_source_files_properties(${traversal} PROPERTIES COMPILE_OPTIONS "${lighter}"
+                                SKIP_PRECOMPILE_HEADERS ON)  # made for other options
+  endforeach()
+endif()
