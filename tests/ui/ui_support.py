@@ -50,7 +50,7 @@ class Gate:
         def guarded(*arguments: object, **named: object) -> object:
             if threading.current_thread() is not threading.main_thread():
                 self._parked.add(threading.get_ident())
-                self._open.wait()
+                self._open.wait(5.0)  # not for ever: some operators wait for the thread's end
                 self._parked.discard(threading.get_ident())
             return function(*arguments, **named)
 
