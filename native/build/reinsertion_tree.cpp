@@ -79,6 +79,7 @@ public:
 
     ReinsertionTree run() {
         new_.pairs[0] = old_.pairs[0];
+        new_.parents[0] = ReinsertionTree::root;
         if (old_.is_leaf(old_.child(ReinsertionTree::root))) return std::move(new_);
         constexpr std::size_t subtrees_wanted = 512;
         std::vector<Place> top{{old_.child(ReinsertionTree::root), 1, ReinsertionTree::root}};

@@ -224,6 +224,7 @@ TEST(ReinsertionMoves, ASingleMoveChangesTheCostByItsGain) {
 
 /// Checks that the state of the optimiser is a tree over all leaves whose boxes are right.
 void expect_valid(const ReinsertionTree& tree) {
+    ASSERT_EQ(tree.parent(ReinsertionTree::root), ReinsertionTree::root);
     std::vector<std::uint8_t> leaves(tree.pairs.size(), 0);
     std::vector<std::uint32_t> waiting{ReinsertionTree::root};
     std::size_t slots = 0;
