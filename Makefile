@@ -5,7 +5,7 @@ SCENE ?= blender_scenes/atrium.blend
 ARGS ?=
 BLENDER := /usr/bin/blender --background
 PYTHON := PYTHONPATH=build .venv/bin/python
-CPP_FILES = find native tests/native tests/fuzz tests/sanitize -name '*.h' -o -name '*.cpp'
+CPP_FILES = find native tests/native tests/fuzz tests/sanitize -name '*.h' -o -name '*.cpp' -o -name '*.cl'
 
 # The same files in every run of the tests; `make fuzz` takes others.
 FUZZ_CORE = build-sanitize/fuzz_core -max_len=512 -timeout=60 -rss_limit_mb=4096 -artifact_prefix=out/fuzz/

@@ -19,10 +19,11 @@ ROOMS = {
     "build": {"base", "scene", "bvh"},
     "trace": {"base", "scene", "bvh", "build"},
     "render": {"base", "scene", "bvh", "build", "trace"},
+    "opencl": {"base", "scene", "bvh", "build", "trace", "render"},
     # The references answer in the terms of trace/ray.h and share nothing else with what they judge.
     "reference": {"base", "scene", "trace/ray.h"},
     "image": {"base", "scene"},
-    "python": {"base", "scene", "bvh", "build", "trace", "render", "reference", "image"},
+    "python": {"base", "scene", "bvh", "build", "trace", "render", "opencl", "reference", "image"},
 }
 
 

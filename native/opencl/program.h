@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+#include "opencl/device.h"
+
+namespace bvhlab::opencl {
+
+/// Text of a file of kernels/, as it was when this was compiled. Throws std::logic_error for a name
+/// that is not there.
+std::string kernel_source(const std::string& file);
+
+/// Sources and options as one text, which names a program.
+std::string program_text(const ProgramSource& source);
+
+/// Builds a program, or takes it from the folder of binaries (XDG_CACHE_HOME or ~/.cache, then
+/// bvh_lab/opencl) where device, driver and sources are the same. A binary that cannot be used is
+/// built anew, and a folder that cannot be written to is done without.
+/// Throws Error with driver and build log where it does not compile.
+ProgramHandle build_program(const Device& device, const ProgramSource& source);
+
+}  // namespace bvhlab::opencl
