@@ -2,6 +2,7 @@
 # Every target does the set-up and the build that it needs. `make` alone lists the targets.
 
 SCENE ?= blender_scenes/atrium.blend
+DEVICE ?=
 ARGS ?=
 BLENDER := /usr/bin/blender --background
 PYTHON := PYTHONPATH=build .venv/bin/python
@@ -12,7 +13,7 @@ FUZZ_CORE = build-sanitize/fuzz_core -max_len=512 -timeout=60 -rss_limit_mb=4096
 SECONDS_A_TARGET ?= 60
 SEED ?= $(shell date +%s)
 
-export SCENE
+export SCENE DEVICE
 .NOTPARALLEL:
 .PHONY: help setup build compare test lint test-native test-python test-bpy test-blender test-ui \
 	test-sanitize test-fuzz fuzz format test-scenes bench bench-cycles study stability paper zip scenes clean check-scene
@@ -27,10 +28,10 @@ build: setup ## build the native module; PYTHONPATH=build finds the package bvh_
 	@cmake --preset release --log-level=WARNING
 	@cmake --build build
 
-compare: check-scene build ## compare BVHs on SCENE=file (.blend, .npz, .obj, .ply), with ARGS="--builders lbvh,sah"
+compare: check-scene build ## compare BVHs on SCENE=file (.blend, .npz, .obj, .ply), with DEVICE=opencl, ARGS="--builders lbvh,sah"
 	@name=$$(basename "$$SCENE"); out="out/$${name%.*}"; case "$$SCENE" in \
-	*.blend) $(BLENDER) --factory-startup "$$SCENE" --python-exit-code 1 --python addon/cli.py -- compare --out "$$out" $(ARGS);; \
-	*) $(PYTHON) -m bvh_lab compare "$$SCENE" --out "$$out" $(ARGS);; esac
+	*.blend) $(BLENDER) --factory-startup "$$SCENE" --python-exit-code 1 --python addon/cli.py -- compare --out "$$out" $${DEVICE:+--device "$$DEVICE"} $(ARGS);; \
+	*) $(PYTHON) -m bvh_lab compare "$$SCENE" --out "$$out" $${DEVICE:+--device "$$DEVICE"} $(ARGS);; esac
 
 check-scene:
 	$(if $(shell test -f "$(SCENE)" && echo yes),,$(error no such scene file: $(SCENE)))@:
@@ -58,10 +59,11 @@ test-blender: build ## the same tests in Debian's Blender
 test-ui: build ## tests of the panel in a Blender with a window (Xvfb)
 	@$(PYTHON) -m pytest tests/ui
 
+# Without OpenCL: drivers and the code they make are not instrumented.
 test-sanitize: setup ## the C++ tests under address, undefined behaviour and thread sanitizer
 	@for preset in sanitize sanitize-thread; do \
 		cmake --preset $$preset --log-level=WARNING && cmake --build --preset $$preset && \
-		ctest --test-dir build-$$preset --parallel 2 --no-tests=error --output-on-failure --timeout 600 || exit 1; done
+		ctest --test-dir build-$$preset --exclude-regex '^OpenCl' --parallel 2 --no-tests=error --output-on-failure --timeout 600 || exit 1; done
 
 test-fuzz: build ## read mutated files and build trees of random bytes, the same in every run
 	@cmake --preset sanitize --log-level=WARNING && cmake --build --preset sanitize --target fuzz_core
@@ -84,9 +86,9 @@ format: setup ## format all sources
 	@.venv/bin/ruff check --fix .
 	@.venv/bin/ruff format .
 
-bench: build ## time builders and tracing against Embree and mathutils.bvhtree, and the path tracer against Cycles
-	@$(PYTHON) scripts/bench.py --out out/bench $(ARGS)
-	@$(PYTHON) scripts/bench_cycles.py --out out/bench
+bench: build ## time builders and tracing against Embree and mathutils.bvhtree, and the path tracer against Cycles; with DEVICE=opencl, that device
+	@if [ -n "$$DEVICE" ]; then $(PYTHON) scripts/bench_device.py --device "$$DEVICE" --out out/bench $(ARGS); else \
+	$(PYTHON) scripts/bench.py --out out/bench $(ARGS) && $(PYTHON) scripts/bench_cycles.py --out out/bench; fi
 
 bench-cycles: build ## the last part of bench alone, with ARGS="--resolution 320x240"
 	@$(PYTHON) scripts/bench_cycles.py --out out/bench $(ARGS)
@@ -94,7 +96,7 @@ bench-cycles: build ## the last part of bench alone, with ARGS="--resolution 320
 study: build ## the paper's tables and figures from blender_scenes/ into out/study, with ARGS="--builders lbvh,sah"
 	@$(PYTHON) scripts/study.py --out out/study $(ARGS)
 
-stability: build ## errors and speed of all precision choices on hard cases into out/stability (a quarter of an hour; ARGS="--quick")
+stability: build ## errors and speed of all precision choices on hard cases into out/stability (twenty minutes; ARGS="--quick")
 	@$(PYTHON) scripts/stability.py --out out/stability $(ARGS)
 
 paper: check-scene build ## compare costs with the paper's on SCENE=file (.npz, .obj, .ply) into out/paper, with ARGS="--metrics"
