@@ -19,6 +19,9 @@ struct Found {
     cl_device_id id = nullptr;
 };
 
+/// It has a cache of its own, and compiles each kernel once more when it is asked for a binary.
+constexpr const char* pocl = "Portable Computing Language";
+
 std::string trimmed(std::string text) {
     while (!text.empty() && (text.back() == '\0' || text.back() == ' ')) text.pop_back();
     text.erase(0, text.find_first_not_of(' '));
@@ -216,7 +219,7 @@ cl_program Device::program(const ProgramSource& source) {
     if (!program) {
         const Stopwatch watch;
         try {
-            program = build_program(*this, source);
+            program = build_program(*this, source, info_.platform != pocl);
         } catch (...) {
             programs_.erase(text);
             throw;

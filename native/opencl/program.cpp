@@ -7,8 +7,8 @@
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <string_view>
 #include <system_error>
-#include <vector>
 
 namespace bvhlab::opencl {
 namespace {
@@ -51,7 +51,8 @@ ProgramHandle compile(const Device& device, const ProgramSource& source) {
 }
 
 // --- binaries -----------------------------------------------------------------------------------
-// A file holds the text that names the program, its length before it, and the binary behind it.
+// A file holds the text that names the program, and the binary; before each its length, and before
+// the binary a hash of it, as drivers crash over spoilt ones.
 
 /// Empty where the user has no folder for caches.
 fs::path cache_folder() {
@@ -74,24 +75,36 @@ fs::path binary_path(const std::string& key) {
     return folder / (std::to_string(std::hash<std::string>()(key)) + ".bin");
 }
 
+/// What stands before a binary in its file.
+std::string head_of(const std::string& key, std::string_view binary) {
+    return std::to_string(key.size()) + "\n" + key + std::to_string(binary.size()) + "\n" +
+           std::to_string(std::hash<std::string_view>()(binary)) + "\n";
+}
+
 /// The binary kept for `key`, or nothing.
-std::vector<unsigned char> load_binary(const std::string& key) {
+std::string load_binary(const std::string& key) {
     const fs::path path = binary_path(key);
     std::ifstream file(path, std::ios::binary);
     if (path.empty() || !file) return {};
-    const std::vector<unsigned char> bytes{std::istreambuf_iterator<char>(file), {}};
-    const std::string head = std::to_string(key.size()) + "\n" + key;
-    if (bytes.size() <= head.size() || !std::equal(head.begin(), head.end(), bytes.begin()))
-        return {};
-    return {bytes.begin() + std::ptrdiff_t(head.size()), bytes.end()};
+    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    // The binary stands behind two lines that follow the key.
+    std::size_t begin = std::to_string(key.size()).size() + 1 + key.size();
+    for (int line = 0; line < 2; ++line) {
+        begin = bytes.find('\n', begin);
+        if (begin == std::string::npos) return {};
+        ++begin;
+    }
+    std::string binary = bytes.substr(begin);
+    if (bytes.substr(0, begin) != head_of(key, binary)) return {};
+    return binary;
 }
 
 /// A null handle where the binary does not serve.
 ProgramHandle program_of(const Device& device, const ProgramSource& source,
-                         const std::vector<unsigned char>& binary) {
+                         const std::string& binary) {
     const cl_device_id id = device.id();
     const std::size_t size = binary.size();
-    const unsigned char* bytes = binary.data();
+    const auto* bytes = reinterpret_cast<const unsigned char*>(binary.data());
     cl_int status = CL_SUCCESS, code = CL_SUCCESS;
     ProgramHandle program(
         api().CreateProgramWithBinary(device.context(), 1, &id, &size, &bytes, &status, &code));
@@ -108,8 +121,8 @@ void save_binary(const std::string& key, cl_program program) {
             CL_SUCCESS ||
         size == 0)
         return;
-    std::vector<unsigned char> binary(size);
-    unsigned char* bytes = binary.data();
+    std::string binary(size, '\0');
+    char* bytes = binary.data();
     if (api().GetProgramInfo(program, CL_PROGRAM_BINARIES, sizeof(bytes), &bytes, nullptr) !=
         CL_SUCCESS)
         return;
@@ -120,8 +133,7 @@ void save_binary(const std::string& key, cl_program program) {
     const fs::path aside = path.string() + "." + std::to_string(getpid());
     {
         std::ofstream file(aside, std::ios::binary);
-        file << key.size() << '\n' << key;
-        file.write(reinterpret_cast<const char*>(binary.data()), std::streamsize(size));
+        file << head_of(key, binary) << binary;
         file.close();
         if (!file) {
             fs::remove(aside, error);
@@ -141,9 +153,10 @@ std::string program_text(const ProgramSource& source) {
     return text + "// " + source.options + "\n";
 }
 
-ProgramHandle build_program(const Device& device, const ProgramSource& source) {
+ProgramHandle build_program(const Device& device, const ProgramSource& source, bool keep_binary) {
+    if (!keep_binary) return compile(device, source);
     const std::string key = binary_key(device, source);
-    const std::vector<unsigned char> binary = load_binary(key);
+    const std::string binary = load_binary(key);
     if (!binary.empty())
         if (ProgramHandle program = program_of(device, source, binary)) return program;
     ProgramHandle program = compile(device, source);

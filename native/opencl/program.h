@@ -14,10 +14,11 @@ std::string kernel_source(const std::string& file);
 /// Sources and options as one text, which names a program.
 std::string program_text(const ProgramSource& source);
 
-/// Builds a program, or takes it from the folder of binaries (XDG_CACHE_HOME or ~/.cache, then
-/// bvh_lab/opencl) where device, driver and sources are the same. A binary that cannot be used is
-/// built anew, and a folder that cannot be written to is done without.
+/// Builds a program. With `keep_binary` it is taken from the folder of binaries (XDG_CACHE_HOME or
+/// ~/.cache, then bvh_lab/opencl) where device, driver and sources are the same, and else left
+/// there. A binary that cannot be used is built anew; a folder that cannot be written to is done
+/// without.
 /// Throws Error with driver and build log where it does not compile.
-ProgramHandle build_program(const Device& device, const ProgramSource& source);
+ProgramHandle build_program(const Device& device, const ProgramSource& source, bool keep_binary);
 
 }  // namespace bvhlab::opencl

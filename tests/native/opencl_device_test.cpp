@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Devices, programs, buffers and commands; on PoCL in CI.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <cstdlib>
+#include <filesystem>
 #include <numeric>
 #include <string>
 #include <vector>
 
 #include "opencl/commands.h"
+#include "opencl/program.h"
 
 namespace bvhlab::opencl {
 namespace {
@@ -69,6 +73,35 @@ TEST(OpenClProgram, IsBuiltOnce) {
     const double seconds = device()->build_seconds();
     EXPECT_EQ(device()->program(source), first);
     EXPECT_EQ(device()->build_seconds(), seconds);
+}
+
+TEST(OpenClProgram, IsKeptAsABinaryThatMayBeSpoilt) {
+    namespace fs = std::filesystem;
+    const fs::path folder =
+        fs::temp_directory_path() / ("bvhlab_cache_" + std::to_string(getpid()));
+    const char* const before = std::getenv("XDG_CACHE_HOME");
+    const std::string kept = before ? before : "";
+    device();  // PoCL's own cache stays where it is
+    setenv("XDG_CACHE_HOME", folder.c_str(), 1);
+    const ProgramSource source{{"arithmetic.cl"}, "-DKEPT"};
+    const auto files = [&] {
+        std::vector<fs::path> all;
+        for (const auto& entry : fs::directory_iterator(folder / "bvh_lab" / "opencl"))
+            all.push_back(entry.path());
+        return all;
+    };
+    EXPECT_TRUE(build_program(*device(), source, true));
+    ASSERT_EQ(files().size(), 1U);
+    const auto written = fs::last_write_time(files()[0]);
+    EXPECT_TRUE(build_program(*device(), source, true));  // from the file
+    EXPECT_EQ(fs::last_write_time(files()[0]), written);
+    fs::resize_file(files()[0], fs::file_size(files()[0]) / 2);
+    EXPECT_TRUE(build_program(*device(), source, true));
+    fs::permissions(folder / "bvh_lab" / "opencl", fs::perms::owner_read | fs::perms::owner_exec);
+    EXPECT_TRUE(build_program(*device(), {{"arithmetic.cl"}, "-DNOT_KEPT"}, true));
+    fs::permissions(folder / "bvh_lab" / "opencl", fs::perms::owner_all);
+    fs::remove_all(folder);
+    before ? setenv("XDG_CACHE_HOME", kept.c_str(), 1) : unsetenv("XDG_CACHE_HOME");
 }
 
 TEST(OpenClCommands, CopyWhatTheyAreGiven) {
