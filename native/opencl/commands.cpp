@@ -56,6 +56,7 @@ double Times::stage_seconds(const std::string& stage) const {
 Commands::Commands(Device& device, const Token& token)
     : work_group(
           std::min<std::size_t>(device.info().is_gpu ? 128 : 64, device.info().largest_work_group)),
+      suits_gpu(device.info().is_gpu),
       device_(device),
       token_(token) {
     cl_int code = CL_SUCCESS;

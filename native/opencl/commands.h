@@ -88,6 +88,10 @@ public:
     /// Work-items to a group where a Range does not say; kernels must be right for any.
     std::size_t work_group;
 
+    /// Whether work is shared out as suits a GPU, else as suits the cores and caches of a CPU,
+    /// where that differs; results do not. As the device is; tests set it.
+    bool suits_gpu;
+
     /// Names the stage that the launches from now on belong to.
     void stage(const char* name) { stage_ = name; }
 

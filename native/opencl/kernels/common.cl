@@ -29,10 +29,11 @@ inline Box empty_box(void) {
     return (Box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
 }
 
+/// unite of scene/box.h. Of 0 and -0 the first is taken, as there; fmin and fmax leave it open.
 inline Box unite(Box a, Box b) {
     for (int axis = 0; axis < 3; ++axis) {
-        a.lower[axis] = fmin(a.lower[axis], b.lower[axis]);
-        a.upper[axis] = fmax(a.upper[axis], b.upper[axis]);
+        a.lower[axis] = b.lower[axis] < a.lower[axis] ? b.lower[axis] : a.lower[axis];
+        a.upper[axis] = a.upper[axis] < b.upper[axis] ? b.upper[axis] : a.upper[axis];
     }
     return a;
 }
