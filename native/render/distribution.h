@@ -65,6 +65,8 @@ public:
     WeightedChoice choose(double random) const { return choose_by_weight(weights_, sums_, random); }
 
 private:
+    friend struct LightParts;  ///< hands what was prepared to devices
+
     Array<float> weights_;
     Array<double> sums_;
 };

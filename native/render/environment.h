@@ -49,6 +49,8 @@ public:
     double pdf(const glm::dvec3& direction) const;
 
 private:
+    friend struct LightParts;  ///< hands what was prepared to devices
+
     glm::vec3 radiance_at(const glm::dvec2& uv) const;
     double pdf_at(const glm::dvec2& uv) const;
     double interpolated_weight(const glm::dvec2& uv) const;

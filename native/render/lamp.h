@@ -63,6 +63,8 @@ public:
     double brightness(const glm::dvec3& position, const glm::dvec3& normal) const;
 
 private:
+    friend struct LightParts;  ///< hands what was prepared to devices
+
     double nearer(double distance, double sine) const;
     LightSample sample_disk_lamp(const glm::dvec3& position, const glm::dvec2& random) const;
     LightSample sample_sun(const glm::dvec2& random) const;

@@ -39,6 +39,8 @@ public:
     }
 
 private:
+    friend struct LightParts;  ///< hands what was prepared to devices
+
     std::size_t count_ = 0;
     std::array<double, most + 1> sums_{0.0};
 };

@@ -84,6 +84,8 @@ public:
     }
 
 private:
+    friend struct LightParts;  ///< hands what was prepared to devices
+
     /// Lamps or suns.
     struct Lamps {
         std::vector<Lamp> all;  ///< that shine
