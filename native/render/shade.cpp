@@ -2,6 +2,7 @@
 #include "render/shade.h"
 
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <optional>
@@ -27,6 +28,9 @@ struct Shader::Vertex {
 };
 
 namespace {
+
+/// By how much shorter each surface that it passes straight through makes a light path.
+constexpr float pass_reach = 0x1p-22F;
 
 SurfacePoint hit_point(const Scene& scene, const Hits& hits, std::size_t i,
                        const glm::dvec3& direction) {
@@ -178,8 +182,15 @@ void Shader::pass_shadow(LightPaths& light, std::size_t i, const Hits& hits,
     light.radiance[i] *= share;
     if (is_black(share)) return;
     const glm::dvec3 direction(light.directions[i]);
+    const glm::dvec3 end = glm::dvec3(light.origins[i]) + direction;
     light.origins[i] = offset_origin(hit_point(scene_, hits, hit, direction), direction);
-    light.t_max[i] = std::max(0.0F, light.t_max[i] - hits.t[hit]);
+    if (std::isinf(light.t_max[i])) return;
+    // The new origin is not where the ray was: aim at the light's point again, and end a little
+    // earlier for what rounding the direction moves that, so that the light does not hide itself.
+    const glm::vec3 rest(end - glm::dvec3(light.origins[i]));
+    const bool arrived = glm::dot(glm::dvec3(rest), direction) <= 0.0;
+    if (!arrived) light.directions[i] = rest;
+    light.t_max[i] = arrived ? 0.0F : light.t_max[i] - pass_reach;
 }
 
 template <bool textured, bool gloss>

@@ -285,6 +285,32 @@ TEST(PathTracer, EachVeilBeforeALampTakesHalfOfItsLight) {
             EXPECT_NEAR(light(veils, threads) / open, std::pow(0.5, veils), 1e-5);
 }
 
+TEST(PathTracer, EachVeilBeforeAnEmitterTakesHalfOfItsLight) {
+    // A shadow ray that has passed a veil must still end before its emitter.
+    Camera camera = from_above(0.5);
+    camera.to_world = glm::translate(glm::dmat4(1.0), glm::dvec3(0.123, 0.456, 5));
+    camera.clip_start = 4.0;
+    const auto light = [&](int veils, bool threads) {
+        SceneParts parts = veiled(veils, threads, {}, 0.0F);
+        Mesh mesh = *parts.mesh;
+        const auto first = std::uint32_t(mesh.vertices.size());
+        mesh.vertices.insert(mesh.vertices.end(),
+                             {{0.3F, 0.1F, 5.7F}, {1.3F, 0.2F, 6.1F}, {0.2F, 1.4F, 5.9F}});
+        mesh.triangles.push_back({first, first + 1, first + 2});
+        parts.mesh = test::shared(make_mesh(std::move(mesh.vertices), std::move(mesh.triangles)));
+        parts.materials.push_back(diffuse(0.0F, 5.0F));
+        parts.material_index.push_back(2);
+        const Scene scene = make_scene(std::move(parts));
+        return mean(picture_of(scene, camera, 32, {.samples = 4, .paths = {0, 1}}));
+    };
+    const double open = light(0, false);
+    EXPECT_GT(open, 0.01);
+    for (const bool threads : {false, true})
+        for (const int veils : {1, 2, 7})
+            EXPECT_NEAR(light(veils, threads) / open, std::pow(0.5, veils),
+                        1e-3 * std::pow(0.5, veils));
+}
+
 TEST(PathTracer, EachVeilBeforeTheWorldTakesHalfOfItsLight) {
     Camera up = from_above(0.1);
     up.to_world =
