@@ -63,6 +63,7 @@ from typing import NoReturn
 from .native import NativeMissing, load
 from .study.arguments import add_plan_arguments, plan_from_arguments
 from .study.console import ProgressLine, stdout_to_stderr
+from .study.devices import described
 from .study.job import Job
 from .study.load import SUFFIXES, load_mesh_file
 from .study.output import check_writable, publish_folder, staged_folder, write_text_aside
@@ -101,8 +102,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(error, 128 + signal.SIGTERM)
     except (NativeMissing, ValueError, OSError) as error:
         return _fail(error, 1)
-    except MemoryError:
-        return _fail(MemoryError("not enough memory"), 1)
+    except MemoryError as error:  # a device says how much it lacks
+        return _fail(MemoryError(str(error) or "not enough memory"), 1)
     except KeyboardInterrupt:
         return _fail(KeyboardInterrupt("stopped"), 128 + signal.SIGINT)
     except SystemExit as end:  # --help
@@ -350,9 +351,8 @@ def _devices(arguments: argparse.Namespace) -> int:
         _print(json.dumps({"devices": devices, "embree": embree}, indent=1, ensure_ascii=False))
         return 0
     for device in devices:
-        state = f"{device['threads']} threads" if device["available"] else device["reason"]
-        _print(f"{device['id']:<10}{device['name']}: {state}")
-    _print(f"{'embree':<10}{embree['version'] if embree['available'] else embree['reason']}")
+        _print(f"{device['id']:<10} {device['name']}: {described(device)}")
+    _print(f"{'embree':<10} {embree['version'] if embree['available'] else embree['reason']}")
     return 0
 
 

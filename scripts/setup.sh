@@ -19,11 +19,11 @@ packages=(
   blender python3-numpy pocl-opencl-icd ca-certificates
   # test
   libgtest-dev openimageio-tools xvfb xauth libgl1-mesa-dri
-  clang libclang-rt-dev llvm
+  clang libclang-rt-dev llvm oclgrind
 )
 
 # The same things where there is no dpkg to ask.
-commands=(make cmake ninja g++ clang++ llvm-symbolizer pkg-config ccache git blender oiiotool xvfb-run xauth)
+commands=(make cmake ninja g++ clang++ llvm-symbolizer pkg-config ccache git blender oiiotool xvfb-run xauth oclgrind)
 headers=(glm/glm.hpp tbb/version.h OpenImageIO/imageio.h pybind11/pybind11.h hwy/highway.h
   CL/opencl.h gtest/gtest.h)
 

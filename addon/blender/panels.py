@@ -101,6 +101,15 @@ def _draw_start(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     paragraph(layout, context, stage[:1].upper() + stage[1:])
 
 
+def devices_left_out(chosen: str) -> list[str]:
+    """Why devices are not in the list, a sentence each; ``chosen`` is empty for a lost one."""
+    left_out = [device for device in store.devices() if not device["available"]]
+    sentences = [f"{device['name']}: {device['reason']}" for device in left_out]
+    if not chosen:
+        sentences.insert(0, "The device that this file had is not here: the CPU is used")
+    return sentences
+
+
 class BVHLAB_PT_settings(RenderPanel, bpy.types.Panel):
     bl_label = "Settings"
     bl_parent_id = "BVHLAB_PT_compare"
@@ -117,6 +126,8 @@ class BVHLAB_PT_settings(RenderPanel, bpy.types.Panel):
         layout.enabled = store.running is None
         column = layout.column()
         column.prop(settings, "device")
+        for sentence in devices_left_out(settings.device):
+            paragraph(column, context, sentence, icon="INFO")
         column.prop(settings, "use_reordering")
         if settings.use_reordering:
             column.prop(settings, "reorder_key")

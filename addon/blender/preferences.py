@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 from bpy.props import IntProperty, StringProperty
 
+from ..study.devices import described
 from .text import paragraph
 
 PACKAGE = __package__.rpartition(".")[0]
@@ -32,7 +33,7 @@ class BVHLAB_AP_preferences(bpy.types.AddonPreferences):
     )
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Two settings, and the reason where the compiled core is missing."""
+        """Two settings, the devices, and the reason where the compiled core is missing."""
         from . import store
 
         layout = self.layout
@@ -41,6 +42,9 @@ class BVHLAB_AP_preferences(bpy.types.AddonPreferences):
         layout.use_property_split = True
         layout.prop(self, "out_folder")
         layout.prop(self, "threads")
+        for device in store.devices():
+            text = f"{device['name']}: {described(device)}"
+            paragraph(layout, context, text, icon="CHECKMARK" if device["available"] else "INFO")
 
 
 def _preferences() -> BVHLAB_AP_preferences | None:

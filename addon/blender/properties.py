@@ -17,7 +17,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..native import load
+from ..study.devices import CPU, described
 from ..study.plan import BRANCHINGS, QUICK_ITERATIONS, Plan
 from ..study.precision import BOX_TESTS, LAYOUTS, TRIANGLE_TESTS
 from . import preferences, store
@@ -32,13 +32,12 @@ def _device_items(
     settings: BVHLAB_PG_settings, context: bpy.types.Context | None
 ) -> list[tuple[str, str, str, int]]:
     """The devices that can be used; a number depends on the id alone, so that files keep theirs."""
-    if not _devices and not store.native_reason():
-        for device in load().devices():
+    if not _devices:
+        for device in store.devices():
             if device["available"]:
-                number = 0 if device["id"] == "cpu" else zlib.crc32(device["id"].encode()) >> 1
-                name = f"CPU, {device['name']}" if device["id"] == "cpu" else device["name"]
-                text = f"{device['threads']} threads"
-                _devices.append((device["id"], name, text, number))
+                number = 0 if device["id"] == CPU else zlib.crc32(device["id"].encode()) >> 1
+                name = f"{'CPU' if device['id'] == CPU else 'OpenCL'}, {device['name']}"
+                _devices.append((device["id"], name, described(device), number))
     return _devices or [("cpu", "CPU", "The processor", 0)]
 
 
@@ -300,7 +299,7 @@ class BVHLAB_PG_settings(bpy.types.PropertyGroup):
         plan = Plan.from_preset(self.preset)
         plan.builders, plan.branchings = self.builders(), self.branchings()
         plan.reorders = ["off", self.reorder_key] if self.use_reordering else ["off"]
-        plan.devices = [self.device or "cpu"]
+        plan.devices = [self.device or CPU]
         plan.threads = preferences.threads()
         if self.preset == "quick":
             plan.long_side, plan.samples, plan.views = self.resolution, self.samples, self.views

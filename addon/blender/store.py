@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, field
+from typing import Any
 
 import bpy
 
@@ -121,6 +122,12 @@ def native_reason() -> str:
     except NativeMissing as error:
         return str(error)
     return ""
+
+
+@functools.cache  # drivers are asked once: the first question loads them
+def devices() -> list[dict[str, Any]]:
+    """What `core.devices()` lists, none without a core."""
+    return [] if native_reason() else list(load().devices())
 
 
 @functools.cache

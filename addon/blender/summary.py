@@ -83,7 +83,8 @@ def pictures(result: Result) -> str:
     if not made:
         return ""
     if not different:
-        return f"All {len(made)} pictures are equal, pixel for pixel" if len(made) > 1 else ""
+        each = " of each device" if len({row.device for row in made}) > 1 else ""
+        return f"All {len(made)} pictures{each} are equal, pixel for pixel" if len(made) > 1 else ""
     worst = max(different, key=lambda row: row.picture_difference() or 0.0)
     return f"{title(worst)} made another picture: it differs by {worst.picture_difference():.3g}"
 

@@ -7,6 +7,7 @@ import argparse
 import math
 from collections.abc import Iterable
 
+from .devices import named
 from .plan import BRANCHINGS, BUILDERS, PRESETS, REORDERS, Plan
 from .precision import BOX_TESTS, LAYOUTS, TRIANGLE_TESTS
 
@@ -48,7 +49,11 @@ def add_plan_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="A,B",
         help=f"all, or of {','.join(BOX_TESTS)}: plain may miss (default: conservative)",
     )
-    add("--device", metavar="A,B", help="see the command devices (default: cpu)")
+    add(
+        "--device",
+        metavar="A,B",
+        help="see the command devices; opencl is the first OpenCL device (default: cpu)",
+    )
     add(
         "--param",
         metavar="BUILDER.NAME=VALUE",
@@ -121,7 +126,7 @@ def plan_from_arguments(arguments: argparse.Namespace) -> Plan:
     if arguments.builders is not None:
         plan.builders = _choices(arguments.builders, BUILDERS)
     if arguments.device is not None:
-        plan.devices = _words(arguments.device)
+        plan.devices = named(arguments.device)
     if arguments.branching is not None:
         words = _choices(arguments.branching, [str(branching) for branching in BRANCHINGS])
         plan.branchings = [_integer("--branching", word) for word in words]

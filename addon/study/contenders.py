@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from types import ModuleType
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from .accuracy import Accuracy
+from .devices import CPU
 from .judge import Answers, Deviations, Judge, differing_rays
 from .machine import usable_cores
 from .plan import Plan, Variant
@@ -46,19 +48,25 @@ class OurTree:
 
     @property
     def bytes(self) -> int:
-        """Size of the tree in bytes."""
-        return int(self.bvh.stats["bytes"])
+        """Size of the tree in bytes, with its copy on a device, which may be memory of ours."""
+        return int(self.bvh.stats["bytes"]) * (1 if self.row.device == CPU else 2)
 
     def trace(self, rays: RaySet, count: bool, token: Any) -> Any:
         """The core's hits, with work counters if ``count``. Primary rays are never sorted."""
         return self._trace(rays, count, self.row.triangle_test, self.row.box_test, token)
 
     def trace_exactly(self, rays: RaySet, token: Any) -> Any:
-        """The core's hits by the default tests: those that every tree gives."""
-        return self._trace(rays, False, WATERTIGHT, CONSERVATIVE, token)
+        """The cpu's hits by the default tests: those that every tree and device gives."""
+        return self._trace(rays, False, WATERTIGHT, CONSERVATIVE, token, CPU)
 
     def _trace(
-        self, rays: RaySet, count: bool, triangle_test: str, box_test: str, token: Any
+        self,
+        rays: RaySet,
+        count: bool,
+        triangle_test: str,
+        box_test: str,
+        token: Any,
+        device: str = "",
     ) -> Any:
         return self.core.trace(
             self.bvh,
@@ -67,7 +75,7 @@ class OurTree:
             t_max=rays.t_max,
             any_hit=rays.any_hit,
             reorder=self.row.reorder if rays.kind != "primary" else "off",
-            device=self.row.device,
+            device=device or self.row.device,
             threads=self.plan.threads,
             count=count,
             token=token,
@@ -90,6 +98,7 @@ class OurTree:
             reorder=self.row.reorder,
             threads=self.plan.threads,
             token=token,
+            device=self.row.device,
         )
 
 
@@ -145,6 +154,7 @@ def judged(
         hits=int(answers.occluded.sum()),
         hits_sha256=answers.sha256(),
     )
+    row.shape = hits.shape
     if row.exact:
         measurement.differing_rays = differing_rays(answers, rays.reference)
     else:  # it rounds otherwise: bits may differ where the hit does not
@@ -221,16 +231,32 @@ def _row(variant: Variant, label: str) -> Row:
     )
 
 
-def record_build(rows: Sequence[Row], bvh: Any, plan: Plan) -> None:
-    """Add one build's seconds, and what the tree is, to the rows that trace it."""
+def record_build(rows: Sequence[Row], bvh: Any, plan: Plan, timed: bool) -> None:
+    """Add what the tree is, and if ``timed`` one build's seconds, to the rows that trace it."""
     stats = bvh.stats
-    names = [name for name in Tree.__dataclass_fields__ if name != "cost"]
+    names = [name for name in Tree.__dataclass_fields__ if name not in ("cost", "sha256")]
     tree = Tree(**{n: stats[n] for n in names}, cost=bvh.cost(plan.traversal, plan.intersection))
     for row in rows:
         row.tree, row.threads = tree, stats["threads"]
+        row.tree_device = stats["tree_device"]
+        row.kernel_seconds = stats["kernel_seconds"]
+        row.transfer_seconds = stats["transfer_seconds"]
+        row.program_seconds += stats["program_seconds"]
+        if not timed:
+            continue
         row.build_seconds.append(stats["build_seconds"])
         row.tree_seconds.append(stats["tree_seconds"])
         row.collapse_seconds.append(stats["collapse_seconds"])
+
+
+def record_bytes(rows: Sequence[Row], bvh: Any) -> None:
+    """Note what the tree is, byte for byte."""
+    sha = hashlib.sha256()
+    for part in bvh.memory:
+        sha.update(part.data)
+    for row in rows:
+        if row.tree:
+            row.tree.sha256 = sha.hexdigest()
 
 
 def prepare(core: ModuleType, rows: Sequence[Row], bvh: Any, plan: Plan, token: Any) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
+from .devices import CPU, described
 from .method import method
 from .results import KINDS, Result, Row
 from .table import Column, columns, failures, fastest, header, picture_quality
@@ -222,5 +223,8 @@ def _facts(result: Result) -> str:
         "BVH Lab": machine.version,
         "Embree": machine.embree,
     }
+    for device in machine.devices:
+        if device["id"] in plan.devices and device["id"] != CPU:
+            facts[f"Device {device['id']}"] = described(device)
     listed = "\n".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in facts.items())
     return f"<dl>\n{listed}\n</dl>"

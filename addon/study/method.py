@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from .devices import CPU
 from .plan import Plan
 
 
@@ -30,6 +31,13 @@ def method(plan: Plan) -> list[str]:
             "(Meister et al. 2020; aila is the paper's) and traced in that order; primary rays are "
             "not. % sorting: what keys and sorting take of the time."
         )
+    if set(plan.devices) != {CPU}:
+        lines.append(
+            "OpenCL devices: keys, sorting and traversal are timed by the device's own clock, "
+            "kernels alone. Builds are timed by the wall clock from the first command to the last, "
+            "after one that is not. Copying to the device and back, and compiling programs, are in "
+            "no time (CSV and JSON have them apart)."
+        )
     if plan.target_error:
         lines.append(
             f"Time to relMSE {plan.target_error:g}: of the first view's picture, without building "
@@ -50,5 +58,5 @@ def method(plan: Plan) -> list[str]:
         "against its exact crossing; t in units in the last place (ulp) of float32.",
         f"Picture: path traced, {plan.samples} samples per pixel, depth {plan.depth}, "
         f"{plan.shadow_rays} shadow rays a hit{pictured}; the difference is the largest of any "
-        "channel (linear) to the first variant's.",
+        "channel (linear) to the first variant's on the same device.",
     ]

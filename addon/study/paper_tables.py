@@ -124,7 +124,8 @@ class Table:
 def measured_by(results: Sequence[Result], reorder: str = "aila") -> Measured:
     """The measurements of our own rows in all results, one result for each scene.
 
-    Of the rows with reordered rays those with the key ``reorder`` count. Raises ValueError for two
+    Of the rows with reordered rays those with the key ``reorder`` count, and of several devices the
+    first of each plan. Raises ValueError for two
     results of one scene name.
     """
     names = [result.subject.name for result in results]
@@ -134,6 +135,8 @@ def measured_by(results: Sequence[Result], reorder: str = "aila") -> Measured:
     for result in results:
         for row in result.rows:
             if not row.exact or row.error or row.tree is None:
+                continue
+            if row.device != result.plan.devices[0]:
                 continue
             made.labels[row.builder] = row.label
             if row.branching == 2 and row.reorder == "off" and (build := row.build()):

@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, field
 from itertools import product
 from typing import Any
 
+from .devices import CPU, has_tests, resolved
 from .precision import (
     BOX_TESTS,
     CONSERVATIVE,
@@ -80,7 +81,7 @@ class Variant:
         defaults = {FULL, WATERTIGHT, CONSERVATIVE, "off"}
         choices = (self.layout, self.triangle_test, self.box_test, self.reorder)
         parts += [choice for choice in choices if choice not in defaults]
-        if self.device != "cpu":
+        if self.device != CPU:
             parts.append("".join(c if c.isalnum() else "-" for c in self.device))
         return "_".join(parts)
 
@@ -91,7 +92,9 @@ class Plan:
 
     ``reorders`` are of `REORDERS`: how secondary and shadow rays are sorted before they are traced.
     ``layouts``, ``triangle_tests`` and ``box_tests`` are of the module `precision`. Layout "cwbvh"
-    is for branching factor 8 alone: the others have no such variant.
+    is for branching factor 8 alone, tests other than the default ones for device "cpu": there are
+    no other such variants. ``devices`` are ids of `core.devices()`, or "opencl" for the first of
+    those that can be used.
     ``views`` is a number of cameras (the first ones of the scene) or their names.
 
     Pictures have ``width`` x ``height`` pixels, 0 for both meaning ``long_side`` along the longer
@@ -203,7 +206,7 @@ class Plan:
                 self.reorders,
                 self.devices,
             )
-            if has_layout(branching, layout)
+            if has_layout(branching, layout) and has_tests(device, triangle_test, box_test)
         ]
 
     def all_exact(self) -> bool:
@@ -225,8 +228,7 @@ class Plan:
         if builders is not None:
             _check_builders(self.builders, self.params, builders)
         if devices is not None:
-            for device in self.devices:
-                _check_device(device, devices)
+            resolved(self.devices, devices)
 
     def _check_lists(self) -> None:
         for name in ("builders", "branchings", "devices", *CHOICES):
@@ -246,6 +248,11 @@ class Plan:
             raise ValueError(
                 f"layout cwbvh is {CWBVH_BRANCHING}-wide: choose branching {CWBVH_BRANCHING} or "
                 "the layout full, too"
+            )
+        if not self.variants():
+            raise ValueError(
+                "OpenCL devices have the default triangle and box test only: choose those, too, or "
+                "device cpu"
             )
         if self.preset not in PRESETS:
             raise ValueError(f"unknown preset {self.preset!r}; there are: {', '.join(PRESETS)}")
@@ -320,13 +327,3 @@ def _check_builders(
                 there = ", ".join(parameters) or "none"
                 raise ValueError(f"builder {name!r} has no parameter {key!r}; there are: {there}")
             _within(f"{name}.{key}", value, parameters[key]["minimum"], parameters[key]["maximum"])
-
-
-def _check_device(chosen: str, devices: Sequence[Mapping[str, Any]]) -> None:
-    for device in devices:
-        if device["id"] == chosen:
-            if not device["available"]:
-                raise ValueError(f"device {chosen!r} cannot be used: {device['reason']}")
-            return
-    usable = ", ".join(str(device["id"]) for device in devices if device["available"])
-    raise ValueError(f"unknown device {chosen!r}; there are: {usable}")

@@ -57,6 +57,7 @@ class View:
 
     ``ray_camera`` frames the same as ``camera`` for ``ray_width`` x ``ray_height`` pixels, of which
     the rays are that speed is measured on. Kinds and bounces without rays are absent from ``sets``.
+    ``pictures`` holds the first one that each device rendered, (H, W, 3).
     """
 
     name: str
@@ -67,7 +68,9 @@ class View:
     ray_width: int
     ray_height: int
     sets: list[RaySet] = field(default_factory=list)
-    picture: Float32Array | None = None  # the reference variant's, (H, W, 3)
+    pictures: dict[str, Float32Array] = field(
+        default_factory=dict
+    )  # each device's first, (H, W, 3)
 
     @property
     def rays(self) -> int:

@@ -5,7 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from .devices import CPU, short_name
+from .judge import picture_difference
 from .plan import Plan
+from .precision import width_text
 from .rays import View
 from .results import KINDS, Result, Row
 
@@ -41,6 +46,62 @@ def measuring_notes(plan: Plan, groups: int, slow_builds: Sequence[str]) -> list
             f"{groups} groups, and only within a group were they timed interleaved."
         )
     return notes
+
+
+def device_notes(result: Result, views: Sequence[View]) -> list[str]:
+    """What rows of OpenCL devices are, and whether their trees are those of the cpu."""
+    notes = []
+    rows = [row for row in result.rows if row.system == "bvh_lab" and row.device != CPU]
+    for device in dict.fromkeys(row.device for row in rows):
+        built = [row for row in rows if row.device == device and row.tree]
+        hosted = dict.fromkeys(row.label for row in built if row.tree_device == CPU)
+        if hosted:
+            notes.append(
+                f"The binary trees of {', '.join(hosted)} are made by the CPU core for "
+                f"{short_name(device)}, too, as in the paper."
+            )
+        notes += _trees_compared(result, built)
+        notes += [note for view in views if (note := _pictures_compared(view, device))]
+    return notes
+
+
+def _pictures_compared(view: View, device: str) -> str:
+    """How far a device's picture is from the cpu's; empty where one of them is missing."""
+    ours, theirs = view.pictures.get(device), view.pictures.get(CPU)
+    if ours is None or theirs is None:
+        return ""
+    difference = picture_difference(ours, theirs)
+    pixels = difference.any(axis=2)
+    if not pixels.any():
+        return f"Picture of view {view.name}: {short_name(device)}'s is the cpu's, bit for bit."
+    return (
+        f"Picture of view {view.name}: {short_name(device)}'s differs from the cpu's in "
+        f"{100.0 * pixels.mean():.2g}% of the pixels, by {difference.max():.2g} at most and "
+        f"{difference.mean(dtype=np.float64):.2g} on average; the cpu's mean is "
+        f"{theirs.mean(dtype=np.float64):.2g}. Sines, powers and the like round otherwise there."
+    )
+
+
+def _trees_compared(result: Result, rows: Sequence[Row]) -> list[str]:
+    """Whether trees are byte for byte those of the cpu, where both were built."""
+    others = {_shape(row): row for row in result.rows if row.device == CPU and row.tree}
+    pairs = [(row, others[_shape(row)]) for row in rows if _shape(row) in others]
+    trees = {_shape(row): (row, other) for row, other in pairs}
+    different = [
+        f"{row.label} {width_text(row.branching, row.layout)}"
+        for row, other in trees.values()
+        if row.tree and other.tree and row.tree.sha256 != other.tree.sha256
+    ]
+    if not trees:
+        return []
+    device = short_name(rows[0].device)
+    if different:
+        return [f"Trees of {device} that are not those of the cpu: {', '.join(different)}."]
+    return [f"All {len(trees)} trees of {device} are those of the cpu, byte for byte."]
+
+
+def _shape(row: Row) -> tuple[str, int, str]:
+    return (row.builder, row.branching, row.layout)
 
 
 def precision_notes(plan: Plan) -> list[str]:

@@ -11,13 +11,14 @@ import numpy as np
 
 from .accuracy import Accuracy, Errors
 from .convergence import Convergence, TimeToError
+from .devices import CPU
 from .plan import Plan
 from .precision import CONSERVATIVE, FULL, WATERTIGHT, is_exact
 from .records import from_plain, parse_json
 
 KINDS = ("primary", "secondary", "shadow")  # of rays: from the camera, from a hit on, to lights
 COUNTERS = ("node_visits", "box_tests", "triangle_tests")
-FORMAT = 3  # of results.json; 2 had no precision choices and no `Accuracy`
+FORMAT = 4  # of results.json; 3 had nothing of OpenCL devices, 2 no precision choices either
 
 
 class Spread(NamedTuple):
@@ -45,9 +46,11 @@ class Measurement:
 
     ``bounce`` counts from the camera: primary rays and the shadow rays from what they hit have 0,
     the secondary rays from there 1. ``rays`` are those traced; there are no dead ones.
-    ``key_seconds``, ``sort_seconds`` and ``traverse_seconds`` have one entry per timed repeat;
-    generating the rays is in none of them. ``node_visits``, ``box_tests`` and ``triangle_tests``
-    are sums over ``rays``, from a run of their own (None where there are no counters).
+    ``key_seconds``, ``sort_seconds`` and ``traverse_seconds`` have one entry per timed repeat, on
+    an OpenCL device by its own clock; generating the rays is in none of them, nor is copying rays
+    and answers, which ``transfer_seconds`` have. ``node_visits``, ``box_tests`` and
+    ``triangle_tests`` are sums over ``rays``, from a run of their own (None where there are no
+    counters).
     ``hits_sha256`` is the hash of all answers. ``differing_rays`` is how many differ from the
     reference's: bit for bit where they should be the same, else as `Errors` counts.
     """
@@ -66,6 +69,7 @@ class Measurement:
     key_seconds: list[float] = field(default_factory=list)
     sort_seconds: list[float] = field(default_factory=list)
     traverse_seconds: list[float] = field(default_factory=list)
+    transfer_seconds: list[float] = field(default_factory=list)
 
     @property
     def seconds(self) -> list[float]:
@@ -93,7 +97,7 @@ def mrays_per_second(timed: list[Measurement]) -> Spread:
 
 @dataclass
 class Picture:
-    """How one variant's picture of one view compares with the reference variant's.
+    """How one variant's picture of one view compares with the first one of its device.
 
     ``sha256`` is the hash of all pixels, float32. ``largest_difference`` is over all pixels and
     channels, linear; 0 means equal pixel for pixel. ``rays`` counts all that were traced for it, by
@@ -118,7 +122,8 @@ class Picture:
 class Tree:
     """The size of a tree, in the words of `Bvh.stats`; ``cost`` is Eq. 2 (binary) or 3 (wide).
 
-    ``iterations`` and why they ``ended`` are 0 and "" for builders that do not iterate.
+    ``iterations`` and why they ``ended`` are 0 and "" for builders that do not iterate. ``sha256``
+    is of every byte that rays traverse, where trees of other devices than the cpu are built.
     """
 
     nodes: int
@@ -132,6 +137,7 @@ class Tree:
     cost: float
     iterations: int = 0
     ended: str = ""
+    sha256: str = ""
 
 
 @dataclass
@@ -139,7 +145,11 @@ class Row:
     """One variant of the study (``system`` "bvh_lab") or a rival on the same rays ("embree").
 
     ``build_seconds`` has one entry per timed build; for our trees it is ``tree_seconds`` (the
-    binary tree) plus ``collapse_seconds``. ``threads`` is what was used. ``layout``,
+    binary tree) plus ``collapse_seconds``. ``threads`` is what was used, of an OpenCL device its
+    compute units. ``tree_device`` made the binary tree: "cpu" on every device for some builders.
+    ``kernel_seconds`` of the last build are by stage and the device's clock; copies took
+    ``transfer_seconds`` and programs ``program_seconds``, which are in no other time. ``shape`` is
+    how the device's traversal works. All are empty for device "cpu". ``layout``,
     ``triangle_test`` and ``box_test`` are of the module `precision`, and empty for a rival.
     ``prepared_bytes`` are what the triangle test keeps beside the tree, ``prepare_seconds`` what
     making that took, outside of all other times. ``bytes_per_triangle`` counts tree and prepared
@@ -174,6 +184,11 @@ class Row:
     measurements: list[Measurement] = field(default_factory=list)
     pictures: list[Picture] = field(default_factory=list)
     time_to_error: TimeToError | None = None
+    tree_device: str = CPU
+    shape: str = ""
+    kernel_seconds: dict[str, float] = field(default_factory=dict)
+    transfer_seconds: float = 0.0
+    program_seconds: float = 0.0
 
     @property
     def exact(self) -> bool:
@@ -187,6 +202,7 @@ class Row:
                 measurement.key_seconds.append(hits.key_seconds)
                 measurement.sort_seconds.append(hits.sort_seconds)
                 measurement.traverse_seconds.append(hits.traverse_seconds)
+                measurement.transfer_seconds.append(hits.transfer_seconds)
 
     def of_kind(self, kind: str) -> dict[str, list[Measurement]]:
         """The measurements of one kind of ray by view, where all bounces have been timed."""

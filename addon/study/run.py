@@ -13,7 +13,7 @@ import hashlib
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from types import ModuleType
 from typing import Any
@@ -34,9 +34,11 @@ from .contenders import (
     judged,
     prepare,
     record_build,
+    record_bytes,
     tree_jobs,
 )
 from .core_scene import core_scene
+from .devices import CPU, resolved
 from .estimate import Estimate
 from .judge import Answers, picture_difference
 from .machine import describe_machine, free_bytes
@@ -45,6 +47,7 @@ from .progress import Event, Progress, RowChanged, Step
 from .rays import RaySet, View, choose_views, generate_rays, judge_rays
 from .remarks import (
     SLOW_BUILD_SECONDS,
+    device_notes,
     iteration_notes,
     measuring_notes,
     missing_ray_notes,
@@ -85,6 +88,7 @@ def compare(
     core = load()
     plan.check(core.builders(), core.devices())
     check_judge(core, plan)
+    plan = replace(plan, devices=resolved(plan.devices, core.devices()))
     token = core.Token() if token is None else token
     return _Runner(core, scene, plan, token, on_event or (lambda event: None), host).run()
 
@@ -137,6 +141,7 @@ class _Runner:
             self.result.notes.append("Stopped early: rows hold what was measured until then.")
         self.result.notes += iteration_notes(self.result.rows)
         self.result.notes += precision_notes(self.plan)
+        self.result.notes += device_notes(self.result, self.views)
         self.result.notes += measuring_notes(self.plan, self.group, self.slow_builds)
         self.result.notes += missing_ray_notes(self.result, self.views)
         self.result.notes += target_notes(self.result)
@@ -168,6 +173,9 @@ class _Runner:
         bvhs: dict[tuple[int, str], Any] = {}
         self._enter(rows)
         with self._failing_alone(rows):
+            if job.device != CPU:
+                with self.progress.step(f"build {job.builder}", 0.0, f"warming up {job.label}"):
+                    self._build_once(job, timed=False)
             for repeat in range(self.plan.build_repeats):
                 bvhs = {}  # two trees of the largest scenes need not fit
                 guess = self.guess.build(job.builder)
@@ -181,6 +189,8 @@ class _Runner:
             for shape, bvh in bvhs.items():
                 bvh.validate()
                 prepare(self.core, job.rows[shape], bvh, self.plan, self.token)
+                if set(self.plan.devices) != {CPU}:
+                    record_bytes(job.rows[shape], bvh)
         return self._started(
             [
                 OurTree(self.core, row, bvhs.get(shape), self.plan)
@@ -189,8 +199,8 @@ class _Runner:
             ]
         )
 
-    def _build_once(self, job: TreeJob) -> dict[tuple[int, str], Any]:
-        """One timed build: the binary tree, and from it that of each branching and layout."""
+    def _build_once(self, job: TreeJob, timed: bool = True) -> dict[tuple[int, str], Any]:
+        """One build: the binary tree, and from it that of each branching and layout."""
         plan = self.plan
         tree = self.core.build_tree(
             self.mesh,
@@ -205,7 +215,7 @@ class _Runner:
         bvhs = {}
         for (branching, layout), rows in job.rows.items():
             bvh = tree.collapse(branching, layout=layout, token=self.token)
-            record_build(rows, bvh, plan)
+            record_build(rows, bvh, plan, timed)
             bvhs[branching, layout] = bvh
         return bvhs
 
@@ -248,7 +258,8 @@ class _Runner:
         """Everything about a group of contenders, view by view."""
         for view in self.views:
             ours = [c for c in contenders if isinstance(c, OurTree) and not c.row.error]
-            ours.sort(key=lambda tree: not tree.row.exact)  # stable; prefers those as a reference
+            # Stable; the first one is the reference.
+            ours.sort(key=lambda tree: (not tree.row.exact, tree.row.device != CPU))
             if not view.sets and not any(self._prepare(view, tree) for tree in ours):
                 continue
             for rays in view.sets:
@@ -347,9 +358,8 @@ class _Runner:
                 self.judge.judge(trees, self.result, self.study.pictures)
 
     def _keep_picture(self, view: View, row: Row, picture: Any) -> None:
-        if view.picture is None:
-            view.picture = picture.pixels
-        pixels, reference = picture.pixels, view.picture
+        pixels = picture.pixels
+        reference = view.pictures.setdefault(row.device, pixels)
         if np.array_equal(pixels.view(np.uint32), reference.view(np.uint32)):
             pixels = reference  # equal ones share an array, so that hundreds take no memory
         self.study.pictures[row.name, view.name] = pixels

@@ -62,6 +62,8 @@ def csv_record(row: Row) -> dict[str, Any]:
         record[name] = tree.get(name)
     record["bytes_per_triangle"] = row.bytes_per_triangle
     record["prepare_seconds"] = row.prepare_seconds
+    for name in ("tree_device", "shape", "transfer_seconds", "program_seconds"):
+        record[name] = getattr(row, name)
     for name in ("build_seconds", "tree_seconds", "collapse_seconds"):
         seconds = getattr(row, name)
         record[name] = spread(seconds).median if seconds else None
@@ -92,14 +94,14 @@ def csv_record(row: Row) -> dict[str, Any]:
 def measurement_record(row: Row, measurement: Measurement) -> dict[str, Any]:
     """One measurement's line of the CSV file of rays."""
     record: dict[str, Any] = {name: getattr(row, name) for name in ("name", "builder", "branching")}
-    for name in (*PRECISION, "reorder"):
+    for name in (*PRECISION, "reorder", "device"):
         record[name] = getattr(row, name)
     for name in ("view", "kind", "bounce", "rays", "hits", *COUNTERS, "differing_rays"):
         record[name] = getattr(measurement, name)
     speed = mrays_per_second([measurement]) if measurement.seconds else None
     for i, part in enumerate(("_low", "", "_high")):
         record[f"mrays_per_second{part}"] = speed[i] if speed else None
-    for name in ("key_seconds", "sort_seconds", "traverse_seconds"):
+    for name in ("key_seconds", "sort_seconds", "traverse_seconds", "transfer_seconds"):
         seconds = getattr(measurement, name)
         record[name] = spread(seconds).median if seconds else None
     for name in ("judged", "wrong", "false_misses", "false_hits", "wrong_triangles"):

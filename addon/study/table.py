@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from .accuracy import Errors
+from .devices import CPU, described, labels, short_name
 from .method import method
 from .precision import BOX_TESTS, LAYOUTS, SHORT, TRIANGLE_TESTS, tests_in_words, width_text
 from .results import COUNTERS, KINDS, Result, Row, Spread, ratio
@@ -27,6 +28,7 @@ class Column:
 
 def _key_columns(rows: Sequence[Row]) -> list[Column]:
     """What names a row, where not all rows have it in common."""
+    devices = labels(row.device for row in rows)
     chosen = [
         Column("builder", "", lambda row: row.label, left=True, key=True),
         Column("branching", "factor", _width, key=True),
@@ -35,7 +37,7 @@ def _key_columns(rows: Sequence[Row]) -> list[Column]:
         (any(_tests(row) for row in rows), "triangle", "test", _triangle_test),
         (any(_tests(row) for row in rows), "box", "test", _box_test),
         (any(row.reorder != "off" for row in rows), "rays", "reordered", lambda row: row.reorder),
-        (len({row.device for row in rows}) > 1, "device", "", lambda row: row.device),
+        (len(devices) > 1, "device", "", lambda row: devices[row.device]),
     ]
     chosen += [
         Column(title, unit, cell, left=True, key=True) for need, title, unit, cell in more if need
@@ -215,6 +217,8 @@ def title(row: Row) -> str:
     words += _tests(row)
     if row.reorder != "off":
         words.append(f"rays sorted ({row.reorder})")
+    if row.device != CPU:
+        words.append(f"on {short_name(row.device)}")
     return ", ".join(words)
 
 
@@ -317,13 +321,17 @@ def failures(result: Result) -> list[str]:
 def header(result: Result) -> list[str]:
     """Scene, rays and machine, a line each."""
     scene, machine = result.subject, result.machine
-    threads = max((row.threads for row in result.rows), default=0)
+    threads = max((row.threads for row in result.rows if row.device == CPU), default=0)
+    used = {row.device for row in result.rows} - {CPU}
+    devices = [d for d in machine.devices if d["id"] in used]
     return [
         f"Scene {scene.name}: {scene.triangles:,d} triangles ({scene.geometry} geometry), "
         f"{len(scene.views)} views ({', '.join(scene.views)}).",
         f"The picture needs: {', '.join(scene.features) or 'nothing but diffuse surfaces'}.",
         *ray_counts(result),
-        f"{machine.host} with BVH Lab {machine.version}; {machine.cpu}, {threads} threads.",
+        f"{machine.host} with BVH Lab {machine.version}; {machine.cpu}"
+        + (f", {threads} threads." if threads else "."),
+        *(f"Device {device['id']}: {described(device)}." for device in devices),
     ]
 
 

@@ -3,6 +3,8 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <initializer_list>
+#include <map>
 #include <stdexcept>
 
 #include "base/parallel.h"
@@ -11,21 +13,10 @@
 #include "bvh/cost.h"
 #include "bvh/validate.h"
 #include "python/convert.h"
+#include "python/device_calls.h"
 
 namespace bvhlab {
 namespace {
-
-/// A builder's binary tree, which can be collapsed to any branching factor (class `Tree` in
-/// Python).
-struct PyTree {
-    std::shared_ptr<Mesh> mesh;
-    BinaryBvh binary;
-    CostModel model;
-    std::string builder;
-    int threads;
-    double seconds;
-    BuildLog log;
-};
 
 // --- arguments -----------------------------------------------------------------------------------
 
@@ -66,7 +57,6 @@ std::shared_ptr<PyTree> build_tree(const std::shared_ptr<Mesh>& mesh, const std:
                                    double traversal, double intersection,
                                    const std::shared_ptr<Token>& given_token) {
     const BuilderInfo& builder = find_builder(builder_id);
-    check_device(device);
     check_threads(threads);
     if (!(traversal > 0.0 && traversal < 1e6 && intersection > 0.0 && intersection < 1e6))
         throw py::value_error("traversal and intersection costs must be above 0 and below 1e6");
@@ -77,12 +67,15 @@ std::shared_ptr<PyTree> build_tree(const std::shared_ptr<Mesh>& mesh, const std:
     auto tree = std::make_shared<PyTree>();
     tree->mesh = mesh;
     tree->model = {traversal, intersection};
-    tree->builder = builder_id;
+    tree->device = device_named(device);
+    Origin& origin = tree->origin;
+    origin.builder = builder_id;
     with_threads(threads, [&] {
-        tree->threads = thread_count(0);
+        origin.threads = thread_count(0);
+        if (tree->device) return build_on_device(*tree, builder, parameters, *token);
         const Stopwatch watch;
-        tree->binary = builder.build(*mesh, tree->model, parameters, *token, tree->log);
-        tree->seconds = watch.seconds();
+        tree->binary = builder.build(*mesh, tree->model, parameters, *token, origin.log);
+        origin.tree.seconds = watch.seconds();
     });
     return tree;
 }
@@ -95,18 +88,24 @@ std::shared_ptr<PyBvh> collapse_tree(const PyTree& tree, unsigned branching,
 
     const py::gil_scoped_release release;
     auto result = std::make_shared<PyBvh>();
-    result->builder = tree.builder;
-    result->threads = tree.threads;
-    result->tree_seconds = tree.seconds;
-    result->log = tree.log;
-    with_threads(tree.threads, [&] {
+    Origin& origin = result->origin = tree.origin;
+    if (tree.device) {
+        result->bvh = collapse_on_device(tree, branching, layout, origin, *token);
+        return result;
+    }
+    with_threads(origin.threads, [&] {
         const Stopwatch watch;
         result->bvh = layout == NodeLayout::cwbvh
                           ? compress(tree.binary, tree.mesh, tree.model, *token)
                           : collapse(tree.binary, tree.mesh, branching, tree.model, *token);
-        result->collapse_seconds = watch.seconds();
+        origin.collapse.seconds = watch.seconds();
     });
     return result;
+}
+
+double tree_cost(const PyTree& tree) {
+    const py::gil_scoped_release release;
+    return tree.device ? cost(downloaded(tree), tree.model) : cost(tree.binary, tree.model);
 }
 
 std::shared_ptr<PyBvh> build(const std::shared_ptr<Mesh>& mesh, const std::string& builder,
@@ -131,10 +130,46 @@ py::dict log_to_python(const BuildLog& log) {
     return dict;
 }
 
+/// Seconds of kernels by stage, of all the calls.
+py::dict stage_seconds(std::initializer_list<const opencl::CallTimes*> calls) {
+    std::map<std::string, double> seconds;
+    for (const opencl::CallTimes* call : calls)
+        for (const opencl::KernelTime& time : call->device.kernels)
+            seconds[time.stage] += time.seconds;
+    return py::cast(seconds);
+}
+
+/// Every kernel by itself.
+py::list kernels_to_python(const opencl::CallTimes& call) {
+    py::list list;
+    for (const opencl::KernelTime& time : call.device.kernels) {
+        py::dict entry;
+        entry["stage"] = time.stage;
+        entry["kernel"] = time.kernel;
+        entry["launches"] = time.launches;
+        entry["seconds"] = time.seconds;
+        list.append(entry);
+    }
+    return list;
+}
+
+void add_times(py::dict& stats, const Origin& origin) {
+    const opencl::CallTimes &tree = origin.tree, &collapse = origin.collapse;
+    stats["build_seconds"] = tree.seconds + collapse.seconds;
+    stats["tree_seconds"] = tree.seconds;
+    stats["collapse_seconds"] = collapse.seconds;
+    stats["kernel_seconds"] = stage_seconds({&tree, &collapse});
+    stats["transfer_seconds"] = tree.device.transfer_seconds + collapse.device.transfer_seconds;
+    stats["program_seconds"] = tree.program_seconds + collapse.program_seconds;
+}
+
 py::dict stats(const PyBvh& self) {
     const Bvh& bvh = self.bvh;
+    const Origin& origin = self.origin;
     py::dict stats;
-    stats["builder"] = self.builder;
+    stats["builder"] = origin.builder;
+    stats["device"] = origin.device;
+    stats["tree_device"] = origin.tree_device;
     stats["branching"] = bvh.branching();
     stats["layout"] = node_layout_names[std::size_t(bvh.layout())];
     stats["nodes"] = bvh.interior_count() + bvh.leaf_count;
@@ -147,13 +182,33 @@ py::dict stats(const PyBvh& self) {
     stats["bytes"] = bvh.node_bytes() + bvh.leaf_bytes();
     stats["node_bytes"] = bvh.node_bytes();
     stats["leaf_bytes"] = bvh.leaf_bytes();
-    stats["build_seconds"] = self.tree_seconds + self.collapse_seconds;
-    stats["tree_seconds"] = self.tree_seconds;
-    stats["collapse_seconds"] = self.collapse_seconds;
-    stats["threads"] = self.threads;
-    stats["iterations"] = self.log.steps.empty() ? 0 : self.log.steps.back().iteration;
-    stats["ended"] = self.log.ended;
+    add_times(stats, origin);
+    stats["threads"] = origin.threads;
+    stats["iterations"] = origin.log.steps.empty() ? 0 : origin.log.steps.back().iteration;
+    stats["ended"] = origin.log.ended;
     return stats;
+}
+
+/// The arrays of nodes and leaves as bytes: views, read-only.
+py::list memory(const py::object& self) {
+    py::list list;
+    const auto add = [&](const auto& array) {
+        py::array_t<std::uint8_t> view({py::ssize_t(array.size() * sizeof(array[0]))},
+                                       reinterpret_cast<const std::uint8_t*>(array.data()), self);
+        view.attr("flags").attr("writeable") = false;
+        list.append(view);
+    };
+    const auto add_all = [&](const auto& tree) {
+        add(tree.nodes);
+        if constexpr (requires { tree.blocks; }) {
+            add(tree.blocks);
+        } else {
+            add(tree.corners);
+            add(tree.triangles);
+        }
+    };
+    std::visit(add_all, self.cast<const PyBvh&>().bvh.tree);
+    return list;
 }
 
 py::list list_builders() {
@@ -191,16 +246,23 @@ void bind_tree(py::module_& module) {
              py::arg("token") = nullptr,
              "A Bvh of branching factor 2, 4 or 8 in layout \"full\", or 8 in layout \"cwbvh\", as "
              "core.build would give it.")
-        .def(
-            "cost", [](const PyTree& self) { return cost(self.binary, self.model); },
-            "Eq. 2 before any collapse, one reference per leaf, with the costs it was built for.")
-        .def_property_readonly("builder", [](const PyTree& self) { return self.builder; })
+        .def("cost", &tree_cost,
+             "Eq. 2 before any collapse, one reference per leaf, with the costs it was built for.")
+        .def_property_readonly("builder", [](const PyTree& self) { return self.origin.builder; })
+        .def_property_readonly(
+            "device", [](const PyTree& self) { return self.origin.device; },
+            "Full id of the device that it was built for, and that collapses it.")
+        .def_property_readonly(
+            "kernels", [](const PyTree& self) { return kernels_to_python(self.origin.tree); },
+            "What each kernel of an OpenCL device took: [{\"stage\", \"kernel\", \"launches\", "
+            "\"seconds\"}] by its own clock, in order; empty on the cpu.")
         .def_property_readonly("mesh", [](const PyTree& self) { return self.mesh; })
         .def_property_readonly("references",
-                               [](const PyTree& self) { return self.binary.reference_count(); })
-        .def_property_readonly("seconds", [](const PyTree& self) { return self.seconds; })
+                               [](const PyTree& self) { return self.reference_count(); })
+        .def_property_readonly("seconds",
+                               [](const PyTree& self) { return self.origin.tree.seconds; })
         .def_property_readonly(
-            "log", [](const PyTree& self) { return log_to_python(self.log); },
+            "log", [](const PyTree& self) { return log_to_python(self.origin.log); },
             "Of builders that work in iterations: why they `ended`, and `steps` of (iteration, "
             "seconds since the build began, cost of the best tree so far).");
 }
@@ -222,10 +284,27 @@ void bind_bvh(py::module_& module) {
                                "Sizes, counts and build times in seconds; for builders that work "
                                "in iterations how many, and why they `ended`. `node_bytes` are "
                                "those of interior nodes, `leaf_bytes` those of triangles as leaves "
-                               "hold them, unused SIMD lanes included; `bytes` is the sum.")
+                               "hold them, unused SIMD lanes included; `bytes` is the sum. "
+                               "On OpenCL devices: `tree_device` is \"cpu\" where the CPU core "
+                               "makes the binary tree (sah, sbvh, hybrid); build times are by the "
+                               "wall clock from the first command to the last, but for "
+                               "`transfer_seconds` (copies) and `program_seconds` (building "
+                               "programs); `kernel_seconds` by stage and copies are by the "
+                               "device's clock.")
         .def_property_readonly(
-            "log", [](const PyBvh& self) { return log_to_python(self.log); },
+            "log", [](const PyBvh& self) { return log_to_python(self.origin.log); },
             "The binary tree's log, as Tree.log.")
+        .def_property_readonly(
+            "device", [](const PyBvh& self) { return self.origin.device; },
+            "Full id of the device that built it; any can trace it.")
+        .def_property_readonly(
+            "collapse_kernels",
+            [](const PyBvh& self) { return kernels_to_python(self.origin.collapse); },
+            "Of collapse and layout, as Tree.kernels.")
+        .def_property_readonly("memory", &memory,
+                               "What rays traverse, as [(N,) uint8], read-only: nodes, then "
+                               "triangles. Equal trees have equal bytes, whatever device made "
+                               "them.")
         .def(
             "validate",
             [](const PyBvh& self) {
@@ -239,7 +318,7 @@ void bind_bvh(py::module_& module) {
             "Raises RuntimeError with the first broken invariant.")
         .def_property_readonly(
             "mesh", [](const PyBvh& self) { return std::const_pointer_cast<Mesh>(self.bvh.mesh); })
-        .def_property_readonly("builder", [](const PyBvh& self) { return self.builder; })
+        .def_property_readonly("builder", [](const PyBvh& self) { return self.origin.builder; })
         .def_property_readonly("branching", [](const PyBvh& self) { return self.bvh.branching(); })
         .def_property_readonly(
             "layout",
@@ -248,10 +327,6 @@ void bind_bvh(py::module_& module) {
 }
 
 }  // namespace
-
-void check_device(const std::string& device) {
-    if (device != "cpu") throw py::value_error("unknown device '" + device + "'; there is cpu");
-}
 
 void bind_build(py::module_& module) {
     bind_tree(module);
@@ -270,8 +345,9 @@ void bind_build(py::module_& module) {
         py::arg("token") = nullptr,
         "Builds a tree. `layout` is \"full\" (floats, 32 bytes a child) or, for branching 8, "
         "\"cwbvh\" (80-byte nodes of Ylitie, Karras, Laine 2017: boxes quantised outward, at most "
-        "three triangles to a leaf); hits are the same. Raises ValueError for unknown names and "
-        "values out of range, Cancelled after token.cancel().");
+        "three triangles to a leaf); hits are the same. `device` is as of trace(), and the tree is "
+        "the same from each. Raises ValueError for unknown names and values out of range, "
+        "RuntimeError and MemoryError as trace(), Cancelled after token.cancel().");
 }
 
 }  // namespace bvhlab

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Token, Mesh, trace, devices, features.
+// Token, Mesh, trace, features.
 #include <pybind11/stl.h>
 
-#include "base/parallel.h"
+#include <algorithm>
+#include <optional>
+
 #include "python/convert.h"
+#include "python/device_calls.h"
 #include "trace/trace.h"
 #include "trace/transforms.h"
 
@@ -48,26 +51,50 @@ std::shared_ptr<Mesh> mesh_from_python(const py::handle& vertices, const py::han
     return std::make_shared<Mesh>(make_mesh(std::move(positions), std::move(indices)));
 }
 
+opencl::TraceShape shape_named(const std::string& name, const std::string& device) {
+    const auto& names = opencl::trace_shape_names;
+    const auto found = std::ranges::find(names, name);
+    std::string known;
+    for (const char* there : names) known += (known.empty() ? "" : ", ") + std::string(there);
+    if (found == names.end())
+        throw py::value_error("unknown shape '" + name + "'; there are: " + known);
+    const auto shape = opencl::TraceShape(found - names.begin());
+    if (device == "cpu" && shape != opencl::TraceShape::automatic)
+        throw py::value_error("shape '" + name + "' is for OpenCL devices, not for device cpu");
+    return shape;
+}
+
 // --- calls ---------------------------------------------------------------------------------------
 
 PyHits trace_rays(const PyBvh& self, const py::object& origins, const py::object& directions,
                   const py::object& t_min, const py::object& t_max, bool any_hit,
-                  const py::object& reorder, const std::string& device, int threads, bool count,
+                  const py::object& reorder, const std::string& device_id, int threads, bool count,
                   const std::shared_ptr<Token>& given_token, const std::string& triangle_test,
-                  const std::string& box_test) {
-    check_device(device);
+                  const std::string& box_test, const std::string& shape_name) {
     check_threads(threads);
     const RayArguments rays(origins, directions, t_min, t_max);
     const TraceOptions options{
         any_hit, reorder_from_python(reorder),       count,
         threads, triangle_test_named(triangle_test), box_test_named(box_test)};
     const auto token = token_or_new(given_token);
+    const opencl::TraceShape shape = shape_named(shape_name, device_id);
+    std::shared_ptr<opencl::Device> device;
+    std::optional<TracedOnDevice> traced;
     Hits hits;
     {
         const py::gil_scoped_release release;
-        hits = trace(self.bvh, rays.batch(), options, *token);
+        device = device_named(device_id);
+        if (device)
+            traced = trace_on_device(*device, self, rays.batch(), options, shape, *token);
+        else
+            hits = trace(self.bvh, rays.batch(), options, *token);
     }
-    return to_python(std::move(hits), any_hit, count);
+    if (!traced) return to_python(std::move(hits), any_hit, count);
+    PyHits result = to_python<float>(std::move(traced->hits), any_hit, count);
+    result.device = device->info().id;
+    result.shape = opencl::trace_shape_names[std::size_t(traced->hits.shape)];
+    result.transfer_seconds = traced->transfer_seconds;
+    return result;
 }
 
 py::dict precision(const char* id, const char* label, const char* source, const char* bytes_key,
@@ -113,27 +140,6 @@ py::dict precisions() {
     all["box_test"] = box_tests;
     all["layout"] = layouts;
     return all;
-}
-
-py::list list_devices() {
-    py::dict cpu;
-    cpu["id"] = "cpu";
-    cpu["name"] = std::string("native threads, ") + simd_name();
-    cpu["available"] = true;
-    cpu["reason"] = "";
-    cpu["threads"] = thread_count(0);
-    cpu["simd"] = simd_name();
-    py::dict opencl;
-    opencl["id"] = "opencl";
-    opencl["name"] = "OpenCL";
-    opencl["available"] = false;
-    opencl["reason"] = "this version has no OpenCL core yet; everything runs on the cpu device";
-    opencl["threads"] = 0;
-    opencl["simd"] = "";
-    py::list list;
-    list.append(cpu);
-    list.append(opencl);
-    return list;
 }
 
 py::dict features() {
@@ -222,6 +228,13 @@ void bind_hits(py::module_& module) {
                       "test, in no other time.")
         .def_readonly("prepared_bytes", &PyHits::prepared_bytes,
                       "Bytes of those transforms, beside the tree's own.")
+        .def_readonly("device", &PyHits::device, "Full id of the device that traced.")
+        .def_readonly("shape", &PyHits::shape,
+                      "How an OpenCL device's threads shared the work; empty on the cpu.")
+        .def_readonly("transfer_seconds", &PyHits::transfer_seconds,
+                      "Copying rays to an OpenCL device and answers back, and before the first "
+                      "call the tree; in no other time. The other times of such a device are by "
+                      "its own clock.")
         .def_property_readonly("seconds", [](const PyHits& hits) {
             return hits.key_seconds + hits.sort_seconds + hits.traverse_seconds;
         });
@@ -239,20 +252,24 @@ void bind_core(py::module_& module) {
         py::arg("any_hit") = false, py::arg("reorder") = false, py::arg("device") = "cpu",
         py::arg("threads") = 0, py::arg("count") = false, py::arg("token") = nullptr,
         py::arg("triangle_test") = triangle_test_names[0], py::arg("box_test") = box_test_names[0],
+        py::arg("shape") = "automatic",
         "Traces rays (N, 3) float32. `reorder` sorts them first: False or \"off\", True or "
         "\"aila\", \"origin\", \"octahedron\", \"two_point\"; hits come in the order given and "
         "are the same. `count` fills node_visits, box_tests and triangle_tests, (N,) uint32. "
         "`triangle_test` and `box_test` are ids of precisions(): with the default ones hits are "
         "exact and the same from every tree; the others are there to compare speed and error "
-        "with. Raises ValueError naming the first bad ray, or the ids there are.");
+        "with. `device` is \"cpu\", an id of devices(), or \"opencl\" for the first of those that "
+        "can be used; hits are the same. Raises ValueError naming the first bad ray, or the ids "
+        "there are, RuntimeError where a device cannot be used or fails, MemoryError where its "
+        "memory does not suffice. `shape` is how an OpenCL device's threads share the work: "
+        "\"automatic\", \"measured\" (the fastest on the first rays, then kept), \"single\", "
+        "\"persistent\" (binary), \"lanes\" (4 and 8), \"octant\" (cwbvh).");
     module.def(
         "precisions", &precisions,
         "What can be chosen between speed and error: \"triangle_test\" and \"box_test\" of "
         "trace(), \"layout\" of build(). Each a list of {\"id\", \"label\", \"source\"}, the "
         "default first; triangle tests with \"bytes_per_triangle\", what they read of one, "
         "layouts with \"node_bytes\", an 8-wide node's.");
-    module.def("devices", &list_devices,
-               "The devices there are; `reason` says why one is left out.");
     module.def("features", &features, "What this build of the core holds.");
 }
 

@@ -7,7 +7,9 @@
 #include <optional>
 #include <vector>
 
+#include "opencl/renderer.h"
 #include "python/arguments.h"
+#include "python/device_calls.h"
 #include "render/camera_rays.h"
 #include "render/path_rays.h"
 #include "render/renderer.h"
@@ -64,6 +66,7 @@ struct PyPicture {
     py::dict passes, rays, stage_seconds;
     std::uint32_t samples;
     double seconds, trace_seconds;
+    std::string device = "cpu";
 };
 
 PyPicture to_python(Picture&& picture, const Raster& raster) {
@@ -71,8 +74,8 @@ PyPicture to_python(Picture&& picture, const Raster& raster) {
         return to_numpy(std::move(array)).attr("reshape")(raster.height, raster.width, channels...);
     };
     FilmPicture& film = picture.film;
-    PyPicture result{image(film.pixels, 3),  {}, {}, {}, picture.samples, picture.seconds,
-                     picture.trace_seconds()};
+    PyPicture result{image(film.pixels, 3),   {},   {}, {}, picture.samples, picture.seconds,
+                     picture.trace_seconds(), "cpu"};
     if (!film.depth.empty()) {
         result.passes["normal"] = image(film.normal, 3);
         result.passes["depth"] = image(film.depth);
@@ -96,10 +99,16 @@ PathSettings path_settings(std::int64_t depth, std::int64_t shadow_rays) {
 
 /// A Renderer with what it refers to.
 class PyRenderer {
+    template <class Function>
+    auto with_renderer(Function&& function) const {
+        return device_renderer_ ? function(*device_renderer_) : function(*renderer_);
+    }
+
 public:
     PyRenderer(std::shared_ptr<PyBvh> bvh, std::shared_ptr<Scene> scene, const Camera& camera,
                std::int64_t width, std::int64_t height, std::int64_t seed, std::int64_t depth,
-               std::int64_t shadow_rays, const py::object& reorder, bool passes, int threads)
+               std::int64_t shadow_rays, const py::object& reorder, bool passes, int threads,
+               const std::string& device)
         : bvh_(std::move(bvh)),
           scene_(std::move(scene)),
           camera_(camera),
@@ -110,28 +119,42 @@ public:
         options.threads = threads;
         check_memory(raster_, Film::bytes_per_pixel(passes), "pictures");
         const py::gil_scoped_release release;
-        renderer_.emplace(View{bvh_->bvh, *scene_, camera_, raster_}, options);
+        const View view{bvh_->bvh, *scene_, camera_, raster_};
+        device_ = device_named(device);
+        if (!device_) {
+            renderer_.emplace(view, options);
+            return;
+        }
+        const Token token;
+        opencl::Commands commands(*device_, token);
+        device_renderer_.emplace(device_, view, bvh_->copies.on(commands, bvh_->bvh), options,
+                                 token);
     }
+
+    /// Full id of the device that renders.
+    std::string device() const { return device_ ? device_->info().id : "cpu"; }
 
     void render(std::int64_t samples, const std::shared_ptr<Token>& given_token) {
         const std::uint32_t count = count_argument(samples, "samples", 1, most_samples);
         const auto token = token_or_new(given_token);
         const py::gil_scoped_release release;
-        renderer_->render(count, *token);
+        with_renderer([&](auto& renderer) { renderer.render(count, *token); });
     }
 
     std::uint32_t samples() const {
         const py::gil_scoped_release release;
-        return renderer_->samples();
+        return with_renderer([](const auto& renderer) { return renderer.samples(); });
     }
 
     PyPicture picture() const {
         Picture picture;
         {
             const py::gil_scoped_release release;
-            picture = renderer_->picture();
+            picture = with_renderer([](const auto& renderer) { return renderer.picture(); });
         }
-        return to_python(std::move(picture), raster_);
+        PyPicture result = to_python(std::move(picture), raster_);
+        result.device = device();
+        return result;
     }
 
 private:
@@ -139,17 +162,19 @@ private:
     std::shared_ptr<Scene> scene_;
     Camera camera_;
     Raster raster_;
-    std::optional<Renderer> renderer_;
+    std::shared_ptr<opencl::Device> device_;  ///< null: cpu
+    mutable std::optional<Renderer> renderer_;
+    mutable std::optional<opencl::Renderer> device_renderer_;
 };
 
 PyPicture render_call(const std::shared_ptr<PyBvh>& bvh, const std::shared_ptr<Scene>& scene,
                       const Camera& camera, std::int64_t width, std::int64_t height,
                       std::int64_t samples, std::int64_t seed, std::int64_t depth,
                       std::int64_t shadow_rays, const py::object& reorder, bool passes, int threads,
-                      const std::shared_ptr<Token>& token) {
+                      const std::shared_ptr<Token>& token, const std::string& device) {
     count_argument(samples, "samples", 1, most_samples);
     PyRenderer renderer(bvh, scene, camera, width, height, seed, depth, shadow_rays, reorder,
-                        passes, threads);
+                        passes, threads, device);
     renderer.render(samples, token);
     return renderer.picture();
 }
@@ -203,6 +228,7 @@ void bind_picture(py::module_& module) {
             "Rays traced, by kind: primary, secondary, last (after the last bounce, which "
             "only look for light), shadow.")
         .def_readonly("samples", &PyPicture::samples, "Samples that every pixel has.")
+        .def_readonly("device", &PyPicture::device, "Full id of the device that rendered.")
         .def_readonly("seconds", &PyPicture::seconds, "Wall-clock time of rendering.")
         .def_readonly("trace_seconds", &PyPicture::trace_seconds,
                       "Of which keys, sorting and traversal.")
@@ -215,15 +241,18 @@ void bind_renderer(py::module_& module) {
     py::class_<PyRenderer>(module, "Renderer", "A picture that gets better the longer it runs.")
         .def(py::init<std::shared_ptr<PyBvh>, std::shared_ptr<Scene>, const Camera&, std::int64_t,
                       std::int64_t, std::int64_t, std::int64_t, std::int64_t, const py::object&,
-                      bool, int>(),
+                      bool, int, const std::string&>(),
              py::arg("bvh"), py::arg("scene"), py::arg("camera"), py::arg("width"),
              py::arg("height"), py::arg("seed") = 0, py::arg("depth") = 8,
              py::arg("shadow_rays") = 2, py::arg("reorder") = false, py::arg("passes") = false,
-             py::arg("threads") = 0, "Arguments as of core.render. Raises ValueError.")
+             py::arg("threads") = 0, py::arg("device") = "cpu",
+             "Arguments as of core.render. Raises ValueError, and where the device fails "
+             "RuntimeError and MemoryError.")
         .def("render", &PyRenderer::render, py::arg("samples"), py::arg("token") = nullptr,
              "Adds samples to every pixel; one by one or all at once give the same bits. Raises "
              "ValueError, and Cancelled after token.cancel(), keeping what was finished.")
         .def_property_readonly("samples", &PyRenderer::samples, "Samples that every pixel has.")
+        .def_property_readonly("device", &PyRenderer::device, "Full id of the device.")
         .def("picture", &PyRenderer::picture,
              "The Picture so far; also while another thread renders. Where a render was cancelled "
              "the upper pixels may have more samples; a pixel without any is black.");
@@ -262,10 +291,12 @@ void bind_render(py::module_& module) {
                py::arg("width"), py::arg("height"), py::arg("samples") = 1, py::arg("seed") = 0,
                py::arg("depth") = 8, py::arg("shadow_rays") = 2, py::arg("reorder") = false,
                py::arg("passes") = false, py::arg("threads") = 0, py::arg("token") = nullptr,
+               py::arg("device") = "cpu",
                "Path traces a Picture. Paths go on `depth` times after the first hit (0: direct "
                "light) and take `shadow_rays` light samples at each hit. The same picture for "
-               "every tree, reorder and thread count. Raises ValueError, and Cancelled after "
-               "token.cancel().");
+               "every tree, reorder and thread count of one device; another's is the same but for "
+               "the last bits of numbers. `device` is as of trace(). Raises ValueError, Cancelled "
+               "after token.cancel(), and where the device fails RuntimeError and MemoryError.");
 }
 
 }  // namespace bvhlab

@@ -9,8 +9,7 @@
 #include <string>
 
 #include "base/token.h"
-#include "build/build_log.h"
-#include "bvh/wide_bvh.h"
+#include "python/trees.h"
 #include "scene/mesh.h"
 #include "trace/ray.h"
 #include "trace/reorder.h"
@@ -64,20 +63,13 @@ py::array_t<T> to_numpy(Array<T>&& array) {
 /// Moves an array of vectors into numpy as (N, 3) float32 without a copy.
 py::array_t<float> to_numpy(Array<glm::vec3>&& array);
 
-/// A finished tree with what its `stats` tell (class `Bvh` in Python).
-struct PyBvh {
-    Bvh bvh;
-    std::string builder;
-    int threads;
-    double tree_seconds, collapse_seconds;
-    BuildLog log;
-};
-
 /// What core.trace, core.brute_force and EmbreeScene.trace return (class `Hits` in Python).
 struct PyHits {
     py::object t, u, v, triangle, occluded, node_visits, box_tests, triangle_tests;
     double key_seconds = 0, sort_seconds = 0, traverse_seconds = 0, prepare_seconds = 0;
+    double transfer_seconds = 0;
     std::size_t prepared_bytes = 0;
+    std::string device = "cpu", shape;
 };
 
 /// Hits as numpy arrays; the arrays that were not asked for are None.
@@ -114,10 +106,8 @@ void check_threads(int threads);
 /// reorder_names. Throws ValueError for anything else.
 Reorder reorder_from_python(const py::handle& argument);
 
-/// Throws ValueError for a device that does not exist.
-void check_device(const std::string& device);
-
-void bind_core(py::module_& module);       // Token, Mesh, trace, devices, features
+void bind_core(py::module_& module);       // Token, Mesh, trace, features
+void bind_device(py::module_& module);     // devices
 void bind_build(py::module_& module);      // builders, build_tree, Tree, build, Bvh
 void bind_metrics(py::module_& module);    // metrics
 void bind_reference(py::module_& module);  // brute_force, embree, EmbreeScene

@@ -6,6 +6,7 @@ PYBIND11_MODULE(_core, module) {
     module.doc() = "BVH Lab's native core: build, trace and judge bounding volume hierarchies.";
     module.attr("__version__") = BVHLAB_VERSION;
     bvhlab::bind_core(module);
+    bvhlab::bind_device(module);
     bvhlab::bind_build(module);
     bvhlab::bind_metrics(module);
     bvhlab::bind_reference(module);

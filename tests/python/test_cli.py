@@ -110,7 +110,8 @@ def test_builders_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
 def test_devices_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["devices"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == [d["id"] for d in core.devices()] + ["embree"]
+    for line, name in zip(lines, [d["id"] for d in core.devices()] + ["embree"], strict=True):
+        assert line.startswith(f"{name} ")
     assert cli.main(["devices", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["devices"] == core.devices()
 

@@ -124,7 +124,11 @@ def test_orders_of_older_plans_are_read() -> None:
         ({"builders": ["sah", "sah"]}, "builders names one twice"),
         ({"branchings": [2, 3]}, "branching 3 is not known; it is 2, 4 or 8"),
         ({"devices": ["gpu9"]}, "unknown device 'gpu9'; there are: cpu"),
-        ({"devices": ["opencl"]}, "device 'opencl' cannot be used: "),
+        (
+            {"devices": ["cpu", "opencl:no/thing"]},
+            "unknown device 'opencl:no/thing'; there are: cpu",
+        ),
+        ({"devices": ["opencl"], "box_tests": ["plain"]}, "OpenCL devices have the default"),
         ({"repeats": 2}, "repeats is 2; it must be from 3"),
         ({"samples": 0}, "samples is 0"),
         ({"depth": -1}, "depth is -1; it must be from 0"),

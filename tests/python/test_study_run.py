@@ -340,7 +340,7 @@ def test_a_variant_that_answers_otherwise_fails(monkeypatch: pytest.MonkeyPatch)
             return hit
         names = ("occluded", "t", "u", "v", "triangle", *COUNTERS)
         names += ("key_seconds", "sort_seconds", "traverse_seconds")
-        names += ("prepare_seconds", "prepared_bytes")
+        names += ("prepare_seconds", "prepared_bytes", "transfer_seconds", "shape")
         lie = SimpleNamespace(**{name: getattr(hit, name) for name in names})
         lie.t = np.where(hit.occluded, np.nextafter(hit.t, np.float32(0)), hit.t)
         return lie
