@@ -24,8 +24,12 @@ inline std::shared_ptr<const Mesh> shared(Mesh mesh) {
     return std::make_shared<const Mesh>(std::move(mesh));
 }
 
-/// `count` separate triangles in the unit cube, of edge lengths up to `size`.
+/// `count` separate triangles in the unit cube, of edge lengths up to `size`. Sanitizers are many
+/// times slower and look at each access, not at sizes: of large counts they get a tenth.
 inline Mesh random_soup(std::size_t count, float size = 0.1F, std::uint32_t seed = 1) {
+#ifdef BVHLAB_SANITIZE
+    if (count >= 5000) count /= 10;
+#endif
     std::mt19937 random(seed);
     Array<glm::vec3> vertices;
     Array<glm::uvec3> triangles;
