@@ -104,8 +104,8 @@ def moved(distance: float, large: bool) -> Problem:
 
 
 def scaled(size: float, large: bool) -> Problem:
-    # The steps of compressed nodes are 2^-126 at least: boxes of denormal size all look alike there,
-    # and time is linear in the triangles.
+    # The steps of compressed nodes are 2^-126 at least: boxes of denormal size all look alike
+    # there, and time is linear in the triangles.
     rows, count = rows_and_rays(large and size > 1e-37)
     return from_inside(sphere(rows, radius=size), (0, 0, 0), 0.4 * size, count, 202)
 
