@@ -59,7 +59,7 @@ Mesh points(std::size_t count) {
 Mesh nearly_equal(std::size_t count) {
     std::mt19937 random(1);
     Mesh mesh = random_soup(count);
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < mesh.size(); ++i) {
         mesh.vertices[3 * i] = {-1.0F - uniform(random, 0.0F, 0.01F), -1.0F, -1.0F};
         mesh.vertices[3 * i + 1] = {1.0F, 1.0F + uniform(random, 0.0F, 0.01F), 1.0F};
         mesh.vertices[3 * i + 2] = {0.0F, 0.0F, uniform(random, 0.0F, 1.0F)};

@@ -43,7 +43,7 @@ Mesh grid(std::uint32_t side) {
 /// Points and segments only.
 Mesh without_area(std::size_t count) {
     Mesh mesh = random_soup(count);
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < mesh.size(); ++i) {
         glm::uvec3& corners = mesh.triangles[i];
         corners.z = corners.y;
         if (i % 2 == 0) corners.y = corners.z = corners.x;
