@@ -4,76 +4,21 @@
 #include <cmath>
 #include <numbers>
 
-#include "base/parallel.h"
 #include "build/lbvh.h"
 #include "build/reinsertion_optimiser.h"
+#include "build/reinsertion_schedule.h"
 
 namespace bvhlab {
 namespace {
 
-class Annealing {
-public:
-    Annealing(const BinaryBvh& base, const CostModel& model, const AnnealingConfig& config,
-              const Stopwatch& clock, Token& token, BuildLog& log)
-        : config_(config),
-          clock_(clock),
-          token_(token),
-          log_(log),
-          optimiser_(base, model, clock, token, log) {}
-
-    BinaryBvh run() {
-        log_.ended = "converged";
-        if (!anneal() || !climb_to_rest()) log_.ended = "time limit";
-        BinaryBvh best = optimiser_.best();
-        token_.advance(1.0F);
-        return best;
-    }
-
-private:
-    /// The schedule of Eq. 5. Returns false once the time is over.
-    bool anneal() {
-        bool at_rest = false;  // so that the rest of a cold half period would change nothing
-        for (int i = 0; i < config_.iterations; ++i) {
-            const double heat = temperature(config_, i);
-            if (heat > 0.0) {
-                optimiser_.heat({.temperature = float(0.5 * heat),
-                                 .prune_probability = float(config_.prune_probability),
-                                 .seed = config_.seed,
-                                 .iteration = std::uint64_t(i) + 1},
-                                std::uint32_t(config_.heated_sparsity), config_.lock_rounds);
-                at_rest = false;
-            } else if (!at_rest) {
-                at_rest = climb(i);
-            }
-            token_.advance(float(i + 1) / float(config_.iterations + 10));
-            if (time_is_over()) return false;
-        }
-        return true;
-    }
-
-    /// What is left to gain after the last heating. Returns false once the time is over.
-    bool climb_to_rest() {
-        for (int i = config_.iterations; !climb(i); ++i)
-            if (time_is_over()) return false;
-        return true;
-    }
-
-    /// One cold iteration. Returns whether it changed next to nothing.
-    bool climb(int iteration) {
-        return optimiser_.climb(std::uint32_t(iteration) + 1, 1, config_.lock_rounds,
-                                config_.threshold);
-    }
-
-    bool time_is_over() const {
-        return config_.max_seconds > 0.0 && clock_.seconds() >= config_.max_seconds;
-    }
-
-    const AnnealingConfig& config_;
-    const Stopwatch& clock_;
-    Token& token_;
-    BuildLog& log_;
-    ReinsertionOptimiser optimiser_;
-};
+BinaryBvh anneal(const BinaryBvh& base, const CostModel& model, const AnnealingConfig& config,
+                 const Stopwatch& clock, Token& token, BuildLog& log) {
+    ReinsertionOptimiser optimiser(base, model, clock, token, log);
+    Annealing(optimiser, config, clock, token).run(log);
+    BinaryBvh best = optimiser.best();
+    token.advance(1.0F);
+    return best;
+}
 
 }  // namespace
 
@@ -103,7 +48,7 @@ BinaryBvh build_prbvh_a(const Mesh& mesh, const CostModel& model, const Annealin
     const Stopwatch clock;
     const BinaryBvh base = build_lbvh(mesh, token);
     token.begin("building PRBVH_A");
-    return Annealing(base, model, config, clock, token, log).run();
+    return anneal(base, model, config, clock, token, log);
 }
 
 BinaryBvh build_prbvh_sa(const Mesh& mesh, const CostModel& model, const SbvhConfig& base_config,
@@ -111,7 +56,7 @@ BinaryBvh build_prbvh_sa(const Mesh& mesh, const CostModel& model, const SbvhCon
     const Stopwatch clock;
     const BinaryBvh base = build_sbvh(mesh, model, base_config, token);
     token.begin("building PRBVH_SA");
-    return Annealing(base, model, config, clock, token, log).run();
+    return anneal(base, model, config, clock, token, log);
 }
 
 }  // namespace bvhlab

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "opencl/prbvh.h"
 
-#include <algorithm>
-
+#include "build/reinsertion_schedule.h"
 #include "opencl/lbvh.h"
 #include "opencl/reinsertion_optimiser.h"
 
@@ -11,22 +10,7 @@ namespace bvhlab::opencl {
 DeviceBinary climb(Commands& commands, const DeviceBinary& base, const CostModel& model,
                    const PrbvhConfig& config, const Stopwatch& clock, Token& token, BuildLog& log) {
     ReinsertionOptimiser optimiser(commands, base, model, clock, token, log);
-    const auto limit = std::uint32_t(config.iterations);
-    auto sparsity = std::uint32_t(config.sparsity);
-    log.ended = "iteration limit";
-    for (std::uint32_t i = 1; i <= limit; ++i) {
-        const bool at_rest = optimiser.climb(i, sparsity, config.lock_rounds, config.threshold);
-        token.advance(float(i) / float(std::max(limit, i + 1)));
-        if (at_rest && sparsity == 1) {
-            log.ended = "converged";
-            break;
-        }
-        if (at_rest) --sparsity;
-        if (config.max_seconds > 0.0 && clock.seconds() >= config.max_seconds) {
-            log.ended = "time limit";
-            break;
-        }
-    }
+    run_climbing(optimiser, config, clock, token, log);
     DeviceBinary best = optimiser.best();
     token.advance(1.0F);
     return best;

@@ -11,54 +11,17 @@
 
 #include "build/lbvh.h"
 #include "bvh/collapse.h"
-#include "meshes.h"
 #include "opencl/trace.h"
+#include "rays.h"
 #include "trace/trace.h"
 
 namespace bvhlab::opencl {
 namespace {
 
 using namespace test;
-constexpr float infinity = std::numeric_limits<float>::infinity();
 
 std::shared_ptr<Device> device() {
     return Device::open("opencl");
-}
-
-/// Rays held as arrays.
-struct Rays {
-    std::vector<glm::vec3> origins, directions;
-    std::vector<float> t_min{0.0F}, t_max{infinity};
-
-    RayBatch batch() const { return {origins, directions, t_min, t_max}; }
-    void add(glm::vec3 origin, glm::vec3 direction) {
-        origins.push_back(origin);
-        directions.push_back(direction);
-    }
-};
-
-Rays random_rays(std::size_t count, const Box& bounds, std::uint32_t seed) {
-    std::mt19937 random(seed);
-    Rays rays;
-    const glm::vec3 size = bounds.upper - bounds.lower;
-    for (std::size_t i = 0; i < count; ++i)
-        rays.add(bounds.lower + size * uniform_vector(random, -0.2F, 1.2F),
-                 uniform_vector(random, -1.0F, 1.0F));
-    return rays;
-}
-
-/// Rays with zero, negative zero, tiny and huge components, from corners, along faces.
-Rays awkward_rays(const Mesh& mesh) {
-    const float parts[] = {0.0F, -0.0F, 1.0F, -1.0F, 1e-42F, -1e-30F, 1e20F};
-    Rays rays;
-    for (std::size_t i = 0; i < mesh.size() && i < 2; ++i)
-        for (const float x : parts)
-            for (const float y : parts)
-                for (const float z : parts)
-                    if (x != 0.0F || y != 0.0F || z != 0.0F)
-                        rays.add(mesh.triangle(i).a - glm::vec3(0.0F, 0.0F, float(i % 3)),
-                                 {x, y, z});
-    return rays;
 }
 
 /// Rays at corners and points of edges, from near and far: double decides next to none of them.
@@ -162,7 +125,7 @@ TEST(OpenClTrace, AgreesOnAwkwardRaysAndMeshes) {
                                         sphere(8, {}, 1e-20F), sphere(8, {}, 1e-35F),
                                         sphere(8, {}, 1e18F), scaled(random_soup(300), 1e30F)}) {
         const auto held = shared(std::move(mesh));
-        expect_all_agree(held, awkward_rays(*held));
+        expect_all_agree(held, awkward_rays(*held, 2));
         expect_all_agree(held, random_rays(300, held->bounds, 5));
     }
 }
@@ -253,7 +216,7 @@ TEST(OpenClTrace, AllShapesGiveTheSameHits) {
         for (const std::string& layout : layouts) {
             const Bvh bvh = tree_of(binary, held, layout);
             const TraceShape shape = other_shape(layout);
-            for (const Rays& rays : {random_rays(3000, held->bounds, 33), awkward_rays(*held),
+            for (const Rays& rays : {random_rays(3000, held->bounds, 33), awkward_rays(*held, 2),
                                      aimed_rays(*held, 500)}) {
                 for (const bool any_hit : {false, true})
                     expect_the_cpus_hits(bvh, rays, {{.any_hit = any_hit}, 0, shape}, layout);

@@ -13,7 +13,7 @@
 
 #include "build/lbvh.h"
 #include "bvh/collapse.h"
-#include "meshes.h"
+#include "rays.h"
 #include "reference/brute_force.h"
 #include "trace/intersect.h"
 
@@ -21,43 +21,6 @@ namespace bvhlab {
 namespace {
 
 using namespace test;
-constexpr float infinity = std::numeric_limits<float>::infinity();
-
-/// Rays held as arrays.
-struct Rays {
-    std::vector<glm::vec3> origins, directions;
-    std::vector<float> t_min{0.0F}, t_max{infinity};
-
-    RayBatch batch() const { return {origins, directions, t_min, t_max}; }
-    void add(glm::vec3 origin, glm::vec3 direction) {
-        origins.push_back(origin);
-        directions.push_back(direction);
-    }
-};
-
-Rays random_rays(std::size_t count, const Box& bounds, std::uint32_t seed) {
-    std::mt19937 random(seed);
-    Rays rays;
-    const glm::vec3 size = bounds.upper - bounds.lower;
-    for (std::size_t i = 0; i < count; ++i)
-        rays.add(bounds.lower + size * uniform_vector(random, -0.2F, 1.2F),
-                 uniform_vector(random, -1.0F, 1.0F));
-    return rays;
-}
-
-/// Rays with zero, negative zero and tiny components, from corners, along faces.
-Rays awkward_rays(const Mesh& mesh) {
-    const float parts[] = {0.0F, -0.0F, 1.0F, -1.0F, 1e-42F, -1e-30F, 1e20F};
-    Rays rays;
-    for (std::size_t i = 0; i < mesh.size() && i < 4; ++i)
-        for (const float x : parts)
-            for (const float y : parts)
-                for (const float z : parts)
-                    if (x != 0.0F || y != 0.0F || z != 0.0F)
-                        rays.add(mesh.triangle(i).a - glm::vec3(0.0F, 0.0F, float(i % 3)),
-                                 {x, y, z});
-    return rays;
-}
 
 bool same_bits(const Array<float>& a, const Array<float>& b) {
     return a.size() == b.size() &&
@@ -113,7 +76,7 @@ TEST(Trace, AllVariantsAgreeOnAwkwardRaysAndMeshes) {
                                         sphere(8, glm::vec3(1e6F)), sphere(8, {}, 1e-20F),
                                         sphere(8, {}, 1e18F)}) {
         const auto held = shared(std::move(mesh));
-        expect_one_answer(held, awkward_rays(*held));
+        expect_one_answer(held, awkward_rays(*held, 4));
         expect_one_answer(held, random_rays(300, held->bounds, 5));
     }
 }
