@@ -139,6 +139,9 @@ def test_pictures_that_cannot_be_written_are_os_errors(tmp_path: Path) -> None:
 
 # --- signals -------------------------------------------------------------------------------------
 
+# A shell without a terminal lets what it starts in the background ignore SIGINT.
+HEARS_SIGINT = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+
 # Says when it has written half of the report, and waits there.
 HALF_WRITTEN = """
 import sys, time
@@ -173,8 +176,9 @@ def test_a_signal_leaves_nothing_half_written(
     out = tmp_path / "out"
     out.mkdir()
     (out / "results.json").write_text("of the last run")
+    command = ["compare", mesh_file, *QUICK, "--out", str(out)]
     process = subprocess.Popen(
-        [sys.executable, "-c", program, "compare", mesh_file, *QUICK, "--out", str(out)],
+        [sys.executable, "-c", HEARS_SIGINT + program, *command],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     assert process.stdout is not None
