@@ -16,7 +16,7 @@ SEED ?= $(shell date +%s)
 export SCENE DEVICE
 .NOTPARALLEL:
 .PHONY: help setup build compare test lint test-native test-python test-bpy test-blender test-ui \
-	test-sanitize test-fuzz fuzz format test-scenes bench bench-cycles study stability paper zip scenes clean check-scene
+	test-files test-sanitize test-fuzz fuzz format test-scenes bench bench-cycles study stability paper zip scenes clean check-scene
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-13s %s\n", $$1, $$2}' Makefile
@@ -36,7 +36,7 @@ compare: check-scene build ## compare BVHs on SCENE=file (.blend, .npz, .obj, .p
 check-scene:
 	$(if $(shell test -f "$(SCENE)" && echo yes),,$(error no such scene file: $(SCENE)))@:
 
-test: lint test-native test-python test-bpy test-blender test-ui ## run every test, fast ones first; stops at the first layer that fails
+test: lint test-native test-python test-files test-bpy test-blender test-ui ## run every test, fast ones first; stops at the first layer that fails
 
 lint: build ## check format, style and types
 	@$(CPP_FILES) | xargs .venv/bin/clang-format --dry-run -Werror
@@ -65,12 +65,14 @@ test-sanitize: setup ## the C++ tests under address, undefined behaviour and thr
 		cmake --preset $$preset --log-level=WARNING && cmake --build --preset $$preset && \
 		ctest --test-dir build-$$preset --exclude-regex '^OpenCl' --parallel 2 --no-tests=error --output-on-failure --timeout 600 || exit 1; done
 
-test-fuzz: build ## read mutated files and build trees of random bytes, the same in every run
+test-fuzz: build ## build trees of mutated bytes under sanitizers, the same in every run
 	@cmake --preset sanitize --log-level=WARNING && cmake --build --preset sanitize --target fuzz_core
 	@rm -rf out/fuzz/first && mkdir -p out/fuzz/first
 	@$(FUZZ_CORE) -seed=1 -runs=20000 -max_total_time=60 out/fuzz/first tests/fuzz/corpus/core >out/fuzz/core.log 2>&1 || \
 		{ tail -n 60 out/fuzz/core.log; echo "make test-fuzz: the bytes are in out/fuzz/"; exit 1; }
 	@echo "core: $$(tail -n 1 out/fuzz/core.log)"
+
+test-files: build ## read mutated files, the same in every run
 	@$(PYTHON) tests/fuzz/fuzz_files.py --runs 500 --seconds 20
 
 fuzz: build ## the same with new bytes, SECONDS_A_TARGET=60 for each target, SEED=number

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <memory>
 #include <new>
 #include <stdexcept>
@@ -17,7 +18,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void refuse(const fs::path& path, const std::string& reason) {
+/// Libraries quote what they do not understand: bytes of the file, which are no text.
+[[noreturn]] void refuse(const fs::path& path, std::string reason) {
+    const auto is_text = [](char c) { return (c >= ' ' && c <= '~') || c == '\n'; };
+    std::ranges::replace_if(reason, std::not_fn(is_text), '?');
     throw std::runtime_error("cannot read " + path.string() + ": " + reason);
 }
 
