@@ -65,7 +65,7 @@ test-sanitize: setup ## the C++ tests under address, undefined behaviour and thr
 		cmake --preset $$preset --log-level=WARNING && cmake --build --preset $$preset && \
 		ctest --test-dir build-$$preset --exclude-regex '^OpenCl' --parallel 2 --no-tests=error --output-on-failure --timeout 600 || exit 1; done
 
-test-fuzz: build ## build trees of mutated bytes under sanitizers, the same in every run
+test-fuzz: setup ## build trees of mutated bytes under sanitizers, the same in every run
 	@cmake --preset sanitize --log-level=WARNING && cmake --build --preset sanitize --target fuzz_core
 	@rm -rf out/fuzz/first && mkdir -p out/fuzz/first
 	@$(FUZZ_CORE) -seed=1 -runs=20000 -max_total_time=60 out/fuzz/first tests/fuzz/corpus/core >out/fuzz/core.log 2>&1 || \

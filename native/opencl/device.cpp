@@ -78,7 +78,6 @@ void describe(DeviceInfo& info, cl_device_id id) {
     info.largest_work_group = device_value<std::size_t>(id, CL_DEVICE_MAX_WORK_GROUP_SIZE);
     const std::string extensions = device_text(id, CL_DEVICE_EXTENSIONS) + " ";
     const auto has = [&](const char* name) { return extensions.find(name) != std::string::npos; };
-    info.has_sub_groups = has("cl_khr_subgroups ") || has("cl_intel_subgroups ");
     info.has_long_atomics =
         has("cl_khr_int64_base_atomics ") && has("cl_khr_int64_extended_atomics ");
     info.reason = lack(id);

@@ -25,7 +25,6 @@ struct DeviceInfo {
     std::uint64_t local_memory = 0;    ///< bytes of a work-group
     std::uint32_t compute_units = 0;
     std::size_t largest_work_group = 0;
-    bool has_sub_groups = false;    ///< cl_khr_subgroups or a vendor's
     bool has_long_atomics = false;  ///< cl_khr_int64_base_atomics and _extended_atomics
 };
 

@@ -18,7 +18,6 @@ namespace fs = std::filesystem;
 std::string options_of(const Device& device, const ProgramSource& source) {
     std::string options = "-cl-std=CL1.2 -w " + source.options;
     if (device.info().has_long_atomics) options += " -DHAS_LONG_ATOMICS";
-    if (device.info().has_sub_groups) options += " -DHAS_SUB_GROUPS";
     if (device.info().is_gpu) options += " -DIS_GPU";
     return options;
 }
