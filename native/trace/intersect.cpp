@@ -1,43 +1,50 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "trace/intersect.h"
 
+#include <algorithm>
 #include <cmath>
 
-#include "scene/exact_volume.h"
+#include "trace/expanded.h"
+#include "trace/lattice.h"
 
 namespace bvhlab {
 
-double exact_edge_function(const PreparedRay& ray, const float (&from)[3], const float (&to)[3]) {
-    const glm::vec3 p(from[0], from[1], from[2]), q(to[0], to[1], to[2]);
+bool decide_edges(const PreparedRay& ray, const float (&corners)[3][3], EdgeFunctions& edges) {
+    constexpr int from[3] = {2, 0, 1}, to[3] = {1, 2, 0};
+    double* const values[3] = {&edges.a, &edges.b, &edges.c};
     const double length = ray.given_direction[ray.kz];
-    return exact_volume(ray.origin, ray.given_direction, p, q).value() / length;
+    LatticeTriangle lattice;
+    const bool fits = lattice.set(ray, corners);
+    bool positive = std::max({edges.a, edges.b, edges.c}) > edges.bound;
+    bool negative = std::min({edges.a, edges.b, edges.c}) < -edges.bound;
+    Integer128 exact[3] = {};
+    for (int i = 0; i < 3; ++i) {
+        double& value = *values[i];
+        if (std::abs(value) > edges.bound) continue;
+        if (fits) {
+            exact[i] = lattice.edge(from[i], to[i]);
+            value = double(exact[i]) * lattice.edge_unit / length;
+        } else {
+            value = expanded_edge_function(ray, corners[from[i]], corners[to[i]]);
+        }
+        positive |= value > 0.0;
+        negative |= value < 0.0;
+        if (positive && negative) return false;
+    }
+    for (int i = 0; i < 3; ++i)
+        if (!is_double(exact[i]))
+            *values[i] = expanded_edge_function(ray, corners[from[i]], corners[to[i]]);
+    return true;
 }
 
 bool exact_plane_crossing(const PreparedRay& ray, const float (&corners)[3][3],
                           PlaneCrossing& crossing) {
-    const auto corner = [&](int i) {
-        return glm::vec3(corners[i][0], corners[i][1], corners[i][2]);
-    };
-    const glm::vec3 a = corner(0), b = corner(1), c = corner(2);
-    const ExactSum at_b = exact_volume(ray.origin, ray.given_direction, c, a);
-    const ExactSum at_c = exact_volume(ray.origin, ray.given_direction, a, b);
-    ExactSum determinant = exact_volume(ray.origin, ray.given_direction, b, c);
-    determinant.add_scaled(at_b, 1.0);
-    determinant.add_scaled(at_c, 1.0);
-    // det(a - o, b - o, c - o)
-    ExactSum numerator = exact_volume(ray.origin, a, b, c);
-    numerator.add_scaled(exact_volume(ray.origin, ray.origin, b, c), -1.0);
-
-    const auto side = [&](float t) {  // sign of the crossing's t - t
-        ExactSum difference = numerator;
-        difference.add_scaled(determinant, -double(t));
-        return difference.sign() * determinant.sign();
-    };
-    if (side(ray.given_t_min) < 0) return false;
-    if (std::isfinite(ray.given_t_max) && side(ray.given_t_max) > 0) return false;
-    const double area = determinant.value();
-    crossing = {numerator.value() / area / ray.unscale, at_b.value() / area, at_c.value() / area};
-    return true;
+    LatticeTriangle lattice;
+    if (lattice.set(ray, corners)) {
+        const LatticeAnswer answer = lattice_plane_crossing(lattice, ray, crossing);
+        if (answer != LatticeAnswer::unknown) return answer == LatticeAnswer::inside;
+    }
+    return expanded_plane_crossing(ray, corners, crossing);
 }
 
 }  // namespace bvhlab

@@ -158,21 +158,6 @@ inline PreparedRay::PreparedRay(const Ray& ray, const Box& bounds) : BoxRay(ray,
     t_last = double(ray.t_max) / unscale;
 }
 
-/// The edge function of the edge between two corners without rounding errors, for the rare case
-/// that double cannot tell its sign: det(d, from - origin, to - origin) / d[kz], d =
-/// given_direction.
-double exact_edge_function(const PreparedRay& ray, const float (&from)[3], const float (&to)[3]);
-
-/// Where a line crosses the plane of a triangle, as meets_triangle() computes it in double.
-struct PlaneCrossing {
-    double t, u, v;  ///< t scaled
-};
-
-/// The crossing without rounding errors but for those of a quotient each, for a line that meets the
-/// triangle; false where t, exactly, is not in the ray's interval.
-bool exact_plane_crossing(const PreparedRay& ray, const float (&corners)[3][3],
-                          PlaneCrossing& crossing);
-
 /// Computed interval [near, far] in which the ray is inside a box; `planes` by row of
 /// WideNode::planes.
 inline void box_interval(const BoxRay& ray, const float (&planes)[6], float& near, float& far) {
@@ -188,12 +173,21 @@ inline void box_interval(const BoxRay& ray, const float (&planes)[6], float& nea
 
 /// Edge functions of a triangle: twice the signed areas that the ray spans with each edge once all
 /// is sheared so that it runs along the z axis; weights of the corners a, b, c up to a common
-/// factor. Signs are exact.
+/// factor.
 struct EdgeFunctions {
     double a, b, c;
     double z[3];      ///< depths of the corners
     double bound;     ///< on the error of a, b and c
     double farthest;  ///< no corner is farther from the origin along any axis
+
+    /// Whether the sign of one or another is not certain.
+    bool is_vague() const {
+        return std::abs(a) <= bound || std::abs(b) <= bound || std::abs(c) <= bound;
+    }
+    /// Whether signs that are certain differ: then the others do not matter.
+    bool pass_by() const {
+        return (a < -bound || b < -bound || c < -bound) && (a > bound || b > bound || c > bound);
+    }
 };
 
 inline EdgeFunctions edge_functions(const PreparedRay& ray, const float (&corners)[3][3]) {
@@ -217,31 +211,60 @@ inline EdgeFunctions edge_functions(const PreparedRay& ray, const float (&corner
     // farthest coordinate for the scene's.
     const double error = 0x1p-50 * farthest;
     edges.bound = (4.0 * error + 0x1p-50 * largest) * largest + 2.0 * error * error;
-    const auto decide = [&](double& value, int from, int to) {
-        if (std::abs(value) <= edges.bound)
-            value = exact_edge_function(ray, corners[from], corners[to]);
-    };
-    decide(edges.a, 2, 1);
-    decide(edges.b, 0, 2);
-    decide(edges.c, 1, 0);
     edges.farthest = farthest;
     return edges;
 }
 
-/// Whether the ray meets the triangle; then t (scaled), u and v are the answer's. `corners` is
-/// [corner a, b, c][axis]. Triangles without area are never met, nor is one in whose plane the ray
-/// runs.
+/// Gives those edge functions whose sign is not certain their exact sign, and their value but for
+/// the rounding of a sum and a quotient. False where signs differ: the values are then anything.
+bool decide_edges(const PreparedRay& ray, const float (&corners)[3][3], EdgeFunctions& edges);
+
+/// Where a line crosses the plane of a triangle, as meets_triangle() computes it in double.
+struct PlaneCrossing {
+    double t, u, v;  ///< t scaled
+};
+
+/// The crossing without rounding errors but for those of a quotient each, for a line that meets the
+/// triangle; false where t, exactly, is not in the ray's interval.
+bool exact_plane_crossing(const PreparedRay& ray, const float (&corners)[3][3],
+                          PlaneCrossing& crossing);
+
+/// The interval of the triangle's own box, in the arithmetic of the nodes' boxes; false where it is
+/// empty. It is within the ray's [t_min, t_max].
+inline bool own_interval(const PreparedRay& ray, const float (&corners)[3][3], float& near,
+                         float& far) {
+    float planes[6];
+    for (int axis = 0; axis < 3; ++axis) {
+        const float p = corners[0][axis], q = corners[1][axis], r = corners[2][axis];
+        planes[2 * axis] = std::min(p, std::min(q, r));
+        planes[2 * axis + 1] = std::max(p, std::max(q, r));
+    }
+    box_interval(ray, planes, near, far);
+    return near <= far;
+}
+
+/// Whether the ray meets the triangle at a distance that may be the least; then t (scaled), u and v
+/// are the answer's. `corners` is [corner a, b, c][axis]; a triangle whose own box is entered
+/// beyond `nearest` (scaled) may be called missed. Triangles without area are never met, nor is one
+/// in whose plane the ray runs.
 ///
 /// t is the mean of the corners' depths z, weighted by the edge functions. In double, an error e in
 /// each of them moves it by no more than 3 e d / A, to first order, for the largest deviation d of
 /// a z from t and the sum A of the weights; the roundings of mean and quotient by 2^-50 of the
 /// largest |z|. `doubt` is A times that, with 4 for 3. Where it does not tell t to a unit in the
 /// last place of float, or on which side of t_min or t_max, the crossing is computed without
-/// rounding errors.
+/// rounding errors. As that is slow, the box is asked before.
 inline bool meets_triangle(const PreparedRay& ray, const float (&corners)[3][3], float& t, float& u,
-                           float& v) {
-    const auto [a, b, c, z, error, farthest] = edge_functions(ray, corners);
-    if ((a < 0.0 || b < 0.0 || c < 0.0) && (a > 0.0 || b > 0.0 || c > 0.0)) return false;
+                           float& v, float nearest = std::numeric_limits<float>::infinity()) {
+    EdgeFunctions edges = edge_functions(ray, corners);
+    if (edges.pass_by()) return false;
+    float near, far;
+    const bool asked_box = edges.is_vague();
+    if (asked_box) {
+        if (!own_interval(ray, corners, near, far) || near > nearest) return false;
+        if (!decide_edges(ray, corners, edges)) return false;
+    }
+    const auto [a, b, c, z, error, farthest] = edges;
     const double area = a + b + c;
     if (area == 0.0) return false;
     const double depth = (a * z[0] + b * z[1] + c * z[2]) / area;
@@ -256,24 +279,14 @@ inline bool meets_triangle(const PreparedRay& ray, const float (&corners)[3][3],
     const double before_last = (ray.t_last - crossing.t) * size;
     const bool vague = 0x1p26 * error > size;
     if (!vague && (past_first < -doubt || before_last < -doubt)) return false;
+    if (!asked_box && (!own_interval(ray, corners, near, far) || near > nearest)) return false;
     if (vague || 0x1p24 * doubt > std::abs(crossing.t) * size || past_first <= doubt ||
         before_last <= doubt) {
         if (!exact_plane_crossing(ray, corners, crossing)) return false;
     }
+    t = std::clamp(float(crossing.t), near, far);
     u = float(crossing.u);
     v = float(crossing.v);
-
-    // The own box, in the arithmetic of the nodes' boxes. Its interval is within [t_min, t_max].
-    float planes[6];
-    for (int axis = 0; axis < 3; ++axis) {
-        const float p = corners[0][axis], q = corners[1][axis], r = corners[2][axis];
-        planes[2 * axis] = std::min(p, std::min(q, r));
-        planes[2 * axis + 1] = std::max(p, std::max(q, r));
-    }
-    float near, far;
-    box_interval(ray, planes, near, far);
-    if (!(near <= far)) return false;
-    t = std::clamp(float(crossing.t), near, far);
     return true;
 }
 

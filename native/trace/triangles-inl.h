@@ -94,7 +94,7 @@ private:
         float corners[3][3];
         lanes.corners(lane, corners);
         float t, u, v;
-        if (!meets_triangle(ray, corners, t, u, v)) return;
+        if (!meets_triangle(ray, corners, t, u, v, hit.t)) return;
         const std::uint32_t triangle = lanes.triangle(lane);
         if (t < hit.t || (t == hit.t && triangle < hit.triangle)) hit = {t, u, v, triangle};
     }
