@@ -13,21 +13,25 @@
 #include <utility>
 
 #include "base/fork_join.h"
+#include "base/room.h"
 #include "base/token.h"
 
 namespace bvhlab {
 
-/// Runs `function` with at most `threads` threads; 0 means all that oneTBB would use.
-template <class Function>
-decltype(auto) with_threads(int threads, Function&& function) {
-    tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
-    const ForkJoin call;
-    return arena.execute(call.task(std::forward<Function>(function)));
-}
-
 /// Threads that `with_threads(threads, ...)` uses.
 inline int thread_count(int threads) {
     return threads > 0 ? threads : tbb::this_task_arena::max_concurrency();
+}
+
+/// Runs `function` with at most `threads` threads; 0 means all that oneTBB would use. Throws
+/// std::bad_alloc where there is no room to start them.
+template <class Function>
+decltype(auto) with_threads(int threads, Function&& function) {
+    require_room_for_threads(1);  // before oneTBB is asked for anything
+    require_room_for_threads(thread_count(threads));
+    tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
+    const ForkJoin call;
+    return arena.execute(call.task(std::forward<Function>(function)));
 }
 
 using IndexRange = tbb::blocked_range<std::size_t>;

@@ -2,7 +2,7 @@
 #include "build/top_down.h"
 
 #include <tbb/concurrent_vector.h>
-#include <tbb/task_group.h>
+#include <tbb/parallel_for_each.h>
 
 #include <algorithm>
 #include <atomic>
@@ -127,20 +127,35 @@ public:
     }
 
 private:
+    using Feeder = tbb::feeder<std::uint32_t>;
+
+    /// One task: reads what oneTBB hands over unwatched, as ForkJoin::task does.
+    struct Grow {
+        TopDownBuilder* builder;
+        const ForkJoin* call;
+
+        __attribute__((no_sanitize("thread"))) void operator()(std::uint32_t index,
+                                                               Feeder& more) const {
+            call->task(
+                [self = *this, index, &more] { self.builder->grow(index, more, *self.call); })();
+        }
+    };
+
+    /// Not a tbb::task_group: before oneTBB 2022 it counts a task before it allocates it, and waits
+    /// for ever for one that it could not allocate.
     void grow_all() {
         const ForkJoin call;
-        tbb::task_group tasks;
-        tasks.run_and_wait(call.task([&] { grow(0, tasks, call); }));
+        const std::uint32_t root = 0;
+        tbb::parallel_for_each(&root, &root + 1, Grow{this, &call});
     }
 
     /// Grows the subtree of a top node; each right child is a task of its own.
-    void grow(std::uint32_t index, tbb::task_group& tasks, const ForkJoin& call) {
+    void grow(std::uint32_t index, Feeder& more, const ForkJoin& call) {
         SplitScratch scratch;
         while (nodes_[index].state.size > chunk_size) {
             split(index, scratch);
             call.fork();
-            tasks.run(call.task(
-                [this, right = nodes_[index].right, &tasks, &call] { grow(right, tasks, call); }));
+            more.add(nodes_[index].right);
             index = nodes_[index].left;
         }
         TopNode& node = nodes_[index];
