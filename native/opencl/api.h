@@ -13,36 +13,37 @@ namespace bvhlab::opencl {
 
 /// Functions of OpenCL 1.2, found in the loader at run time.
 struct Api {
-#define BVHLAB_OPENCL_FUNCTIONS(USE) \
-    USE(GetPlatformIDs)              \
-    USE(GetPlatformInfo)             \
-    USE(GetDeviceIDs)                \
-    USE(GetDeviceInfo)               \
-    USE(CreateContext)               \
-    USE(ReleaseContext)              \
-    USE(CreateCommandQueue)          \
-    USE(ReleaseCommandQueue)         \
-    USE(CreateBuffer)                \
-    USE(ReleaseMemObject)            \
-    USE(CreateProgramWithSource)     \
-    USE(CreateProgramWithBinary)     \
-    USE(BuildProgram)                \
-    USE(GetProgramInfo)              \
-    USE(GetProgramBuildInfo)         \
-    USE(ReleaseProgram)              \
-    USE(CreateKernel)                \
-    USE(SetKernelArg)                \
-    USE(GetKernelWorkGroupInfo)      \
-    USE(ReleaseKernel)               \
-    USE(EnqueueNDRangeKernel)        \
-    USE(EnqueueReadBuffer)           \
-    USE(EnqueueWriteBuffer)          \
-    USE(EnqueueCopyBuffer)           \
-    USE(EnqueueFillBuffer)           \
-    USE(GetEventInfo)                \
-    USE(GetEventProfilingInfo)       \
-    USE(ReleaseEvent)                \
-    USE(Flush)                       \
+#define BVHLAB_OPENCL_FUNCTIONS(USE)            \
+    USE(GetPlatformIDs)                         \
+    USE(GetPlatformInfo)                        \
+    USE(GetDeviceIDs)                           \
+    USE(GetDeviceInfo)                          \
+    USE(GetExtensionFunctionAddressForPlatform) \
+    USE(CreateContext)                          \
+    USE(ReleaseContext)                         \
+    USE(CreateCommandQueue)                     \
+    USE(ReleaseCommandQueue)                    \
+    USE(CreateBuffer)                           \
+    USE(ReleaseMemObject)                       \
+    USE(CreateProgramWithSource)                \
+    USE(CreateProgramWithBinary)                \
+    USE(BuildProgram)                           \
+    USE(GetProgramInfo)                         \
+    USE(GetProgramBuildInfo)                    \
+    USE(ReleaseProgram)                         \
+    USE(CreateKernel)                           \
+    USE(SetKernelArg)                           \
+    USE(GetKernelWorkGroupInfo)                 \
+    USE(ReleaseKernel)                          \
+    USE(EnqueueNDRangeKernel)                   \
+    USE(EnqueueReadBuffer)                      \
+    USE(EnqueueWriteBuffer)                     \
+    USE(EnqueueCopyBuffer)                      \
+    USE(EnqueueFillBuffer)                      \
+    USE(GetEventInfo)                           \
+    USE(GetEventProfilingInfo)                  \
+    USE(ReleaseEvent)                           \
+    USE(Flush)                                  \
     USE(Finish)
 #define BVHLAB_OPENCL_MEMBER(name) decltype(&::cl##name) name = nullptr;
     BVHLAB_OPENCL_FUNCTIONS(BVHLAB_OPENCL_MEMBER)

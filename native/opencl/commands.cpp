@@ -57,6 +57,7 @@ Commands::Commands(Device& device, const Token& token)
     : work_group(
           std::min<std::size_t>(device.info().is_gpu ? 128 : 64, device.info().largest_work_group)),
       suits_gpu(device.info().is_gpu),
+      use_sub_groups(device.info().sub_groups.usable),
       device_(device),
       token_(token) {
     cl_int code = CL_SUCCESS;

@@ -85,12 +85,17 @@ public:
     Device& device() { return device_; }
     const Token& token() const { return token_; }
 
-    /// Work-items to a group where a Range does not say; kernels must be right for any.
+    /// Work-items to a group where a Range does not say; kernels must be right for any from 3 on.
+    /// (PoCL crashes over barriers in groups of one or two.)
     std::size_t work_group;
 
     /// Whether work is shared out as suits a GPU, else as suits the cores and caches of a CPU,
     /// where that differs; results do not. As the device is; tests set it.
     bool suits_gpu;
+
+    /// Whether kernels for which that pays talk by sub-groups; results do not differ. As the device
+    /// can; tests clear it.
+    bool use_sub_groups;
 
     /// Names the stage that the launches from now on belong to.
     void stage(const char* name) { stage_ = name; }

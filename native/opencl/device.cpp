@@ -80,6 +80,11 @@ void describe(DeviceInfo& info, cl_device_id id) {
     const auto has = [&](const char* name) { return extensions.find(name) != std::string::npos; };
     info.has_long_atomics =
         has("cl_khr_int64_base_atomics ") && has("cl_khr_int64_extended_atomics ");
+    info.sub_groups = {.shuffles = has("cl_khr_subgroup_shuffle "),
+                       .ballots = has("cl_khr_subgroup_ballot "),
+                       .standard = has("cl_khr_subgroups ") ? "CL1.2" : "",
+                       .reason = has("cl_khr_subgroups ") ? "they are checked when it is opened"
+                                                          : "its driver has no cl_khr_subgroups"};
     info.reason = lack(id);
     info.available = info.reason.empty();
 }
@@ -197,6 +202,7 @@ std::shared_ptr<Device> Device::open(const std::string& id) {
         try {
             device.reset(new Device(found.info, found.id));
             device->check_arithmetic();
+            device->check_sub_groups();
         } catch (...) {
             opened.erase(found.info.id);
             throw;

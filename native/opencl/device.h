@@ -13,6 +13,16 @@
 
 namespace bvhlab::opencl {
 
+/// What a device's sub-groups, the threads that its driver runs in step, are good for. Their size
+/// is the driver's affair, and may be another for each kernel.
+struct SubGroups {
+    bool usable = false;    ///< votes and sums (cl_khr_subgroups), checked; the next two go with it
+    bool shuffles = false;  ///< cl_khr_subgroup_shuffle
+    bool ballots = false;   ///< cl_khr_subgroup_ballot
+    std::string standard;   ///< of OpenCL C, for kernels that use them; empty where it has none
+    std::string reason;     ///< why something of them is not used; empty where all is
+};
+
 /// A device as its driver describes it, or a platform without one.
 struct DeviceInfo {
     std::string id;  ///< "opencl:<platform>/<device>"; twins have " #2" and so on behind it
@@ -26,6 +36,7 @@ struct DeviceInfo {
     std::uint32_t compute_units = 0;
     std::size_t largest_work_group = 0;
     bool has_long_atomics = false;  ///< cl_khr_int64_base_atomics and _extended_atomics
+    SubGroups sub_groups;
 };
 
 /// All devices of all platforms. One entry with id "opencl" says why where there is none. A
@@ -37,6 +48,7 @@ std::vector<DeviceInfo> devices();
 struct ProgramSource {
     std::vector<std::string> files;
     std::string options;
+    bool sub_groups = false;  ///< team.cl is by sub-groups, which the device must have
 };
 
 /// An open device with its context and the programs built for it. Kept open once opened. All
@@ -56,6 +68,10 @@ public:
     /// from its sources. Throws Error with driver and build log where it does not compile.
     cl_program program(const ProgramSource& source);
 
+    /// Threads of a sub-group where a kernel runs in groups of `group`; the last one may have
+    /// fewer. 0 where the driver does not say.
+    std::size_t sub_group_size(cl_kernel kernel, std::size_t group) const;
+
     /// Seconds spent building programs so far.
     double build_seconds() const;
 
@@ -67,6 +83,7 @@ public:
 private:
     Device(DeviceInfo info, cl_device_id id);
     void check_arithmetic();
+    void check_sub_groups();
 
     DeviceInfo info_;
     cl_device_id id_;

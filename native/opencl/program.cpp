@@ -16,7 +16,12 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string options_of(const Device& device, const ProgramSource& source) {
-    std::string options = "-cl-std=CL1.2 -w " + source.options;
+    const SubGroups& sub_groups = device.info().sub_groups;
+    const std::string standard = source.sub_groups ? sub_groups.standard : "CL1.2";
+    std::string options = "-cl-std=" + standard + " -w " + source.options;
+    if (source.sub_groups) options += " -DHAS_SUB_GROUPS";
+    if (source.sub_groups && sub_groups.shuffles) options += " -DHAS_SHUFFLES";
+    if (source.sub_groups && sub_groups.ballots) options += " -DHAS_BALLOTS";
     if (device.info().has_long_atomics) options += " -DHAS_LONG_ATOMICS";
     if (device.info().is_gpu) options += " -DIS_GPU";
     return options;
@@ -149,7 +154,7 @@ std::string program_text(const ProgramSource& source) {
     std::string text = "#line 1 \"common.cl\"\n" + kernel_source("common.cl");
     for (const std::string& file : source.files)
         text += "#line 1 \"" + file + "\"\n" + kernel_source(file);
-    return text + "// " + source.options + "\n";
+    return text + "// " + source.options + (source.sub_groups ? ", sub-groups\n" : "\n");
 }
 
 ProgramHandle build_program(const Device& device, const ProgramSource& source, bool keep_binary) {

@@ -17,7 +17,7 @@ namespace {
 
 /// StackEntry of traverse_*_nodes.cl.
 constexpr std::size_t stack_entry_bytes = 12;
-/// Bytes for spilled stacks of one launch.
+/// Bytes for what stacks of one launch have beyond their nearest entries.
 constexpr std::size_t most_spilled = std::size_t(64) << 20U;
 
 /// Rays by which shapes are compared; fewer than the least tell nothing.
@@ -61,7 +61,7 @@ void in_launches(Commands& commands, std::atomic<double>& rays_per_second, std::
         const double rate = rays_per_second.load();
         const double wanted = rate > 0.0 ? rate * launch_seconds : double(first_launch);
         const std::size_t size = std::size_t(
-            std::clamp(wanted, double(std::min(least_launch, first_launch)), double(most)));
+            std::clamp(wanted, double(std::min({least_launch, first_launch, most})), double(most)));
         const std::size_t end = first + std::min(size, count - first);
         const double before = commands.times().kernel_seconds();
         launch(number(first), number(end));
@@ -108,7 +108,7 @@ private:
     void trace_fast(TraceShape shape, const Buffer<std::uint32_t>* order, std::size_t count,
                     const Buffer<std::uint32_t>& undecided) {
         const DeviceInfo& device = commands_.device().info();
-        const TraceKernel form = kernel_of(commands_.suits_gpu, tree_, shape, options_.any_hit);
+        const TraceKernel form = kernel_of(commands_, tree_, shape, options_.any_hit);
         Program program(commands_.device(), form.source);
         Kernel& kernel = program[form.name];
         const Buffer<std::uint32_t> none;
@@ -116,19 +116,31 @@ private:
         const std::size_t most_threads =
             device.compute_units * (device.is_gpu ? threads_on_gpu : threads_on_cpu);
         set_zero(undecided);
-        const auto launch = [&](std::uint32_t first, std::uint32_t end, const auto&... counter) {
+        const auto launch = [&](std::uint32_t first, std::uint32_t end, const auto&... more) {
             const std::size_t threads = std::size_t(end - first) * form.threads;
             const Range range(form.fetches ? std::min(threads, most_threads) : threads, form.group);
             commands_.run(kernel, range, tree_.nodes, tree_.leaves, tree_.triangles, tree_.bounds,
                           rays_, order ? *order : none, std::uint32_t(order != nullptr), first, end,
-                          hits_.hits, hits_.occluded, undecided, counter...);
+                          hits_.hits, hits_.occluded, undecided, more...);
         };
+        // What a team of threads has no room for in local memory.
+        const std::size_t groups = form.group ? (most_threads + form.group - 1) / form.group : 0;
+        const std::size_t teams = groups * form.group / form.threads;
+        const std::size_t far_capacity =
+            form.threads == 1
+                ? 0
+                : std::min(tree_.stack_size - form.stack, most_spilled / stack_entry_bytes / teams);
+        const auto far_stacks =
+            commands_.buffer<std::byte>(teams * far_capacity * stack_entry_bytes);
+        const Local near_stacks{form.group / form.threads * form.stack * stack_entry_bytes};
         in_launches(commands_, tree_.rays_per_second, count,
                     std::size_t(1) << (device.is_gpu ? 20U : 15U), count,
                     [&](std::uint32_t first, std::uint32_t end) {
                         if (!form.fetches) return launch(first, end);
                         set_zero(fetched);
-                        launch(first, end, fetched);
+                        if (form.threads == 1) return launch(first, end, fetched);
+                        launch(first, end, fetched, near_stacks, number(form.stack), far_stacks,
+                               number(far_capacity));
                     });
     }
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "opencl/commands.h"
 #include "opencl/device_tree.h"
-#include "opencl/program.h"
 
 namespace bvhlab::opencl {
 
@@ -36,8 +36,9 @@ struct TraceKernel {
     std::size_t stack;  ///< entries that a ray has without spilling
 };
 
-/// `shape` is one of shapes_for(tree); `suits_gpu` as in Commands.
-TraceKernel kernel_of(bool suits_gpu, const DeviceTree& tree, TraceShape shape, bool any_hit);
+/// `shape` is one of shapes_for(tree). Its threads talk by sub-groups where `commands` has it so
+/// and they are of a size that serves.
+TraceKernel kernel_of(Commands& commands, const DeviceTree& tree, TraceShape shape, bool any_hit);
 
 /// The kernel for rays that the others leave undecided, and for counting.
 TraceKernel careful_kernel_of(bool suits_gpu, const DeviceTree& tree);

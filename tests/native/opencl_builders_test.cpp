@@ -37,7 +37,7 @@ struct Sharing {
     bool suits_gpu = false;
 };
 
-constexpr Sharing sharings[] = {{64, false}, {64, true}, {1, true}, {7, true}, {96, true}};
+constexpr Sharing sharings[] = {{64, false}, {64, true}, {3, true}, {7, true}, {96, true}};
 
 using DeviceBuild = std::function<DeviceBinary(Commands&, const DeviceMesh&, Token&)>;
 

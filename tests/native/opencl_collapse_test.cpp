@@ -233,7 +233,7 @@ TEST(OpenClCollapse, DoesNotDependOnTheGroupSize) {
         expect_the_hosts_bytes(chain(*line), line, {1e-3, 1e3}, {work_group}, some);
     };
     check(7, shapes);
-    check(1, {"4"});
+    check(3, {"4"});
     check(96, {"cwbvh"});
 }
 

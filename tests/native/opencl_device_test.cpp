@@ -56,6 +56,21 @@ TEST(OpenClDevice, ManyBuffersTogetherMustFitToo) {
     open.give_memory(1000);
 }
 
+TEST(OpenClDevice, SaysWhyItDoesNotUseSubGroups) {
+    const SubGroups& sub_groups = device()->info().sub_groups;
+    EXPECT_NE(sub_groups.usable && sub_groups.shuffles && sub_groups.ballots,
+              !sub_groups.reason.empty())
+        << sub_groups.reason;
+    if (!sub_groups.usable) GTEST_SKIP() << "no sub-groups: " << sub_groups.reason;
+    EXPECT_FALSE(sub_groups.standard.empty());
+    Program program(*device(), {{"team.cl", "team_check.cl"}, "", true});
+    const Kernel& kernel = program["check_team"];
+    for (const std::size_t group : {7, 32, 64}) {
+        const std::size_t size = device()->sub_group_size(kernel.handle.get(), group);
+        EXPECT_GT(size, 0U);
+    }
+}
+
 TEST(OpenClProgram, ABuildErrorNamesDriverAndLine) {
     try {
         device()->program({{"arithmetic.cl"}, "-DBox=1"});

@@ -15,7 +15,7 @@
 namespace bvhlab::opencl {
 namespace {
 
-constexpr std::size_t group_sizes[] = {1, 7, 64, 96};
+constexpr std::size_t group_sizes[] = {3, 7, 64, 96};
 
 using Values = std::vector<std::uint32_t>;
 

@@ -62,6 +62,7 @@ struct Variant {
     std::size_t work_group = 0;  ///< 0: the device's own
     TraceShape shape = TraceShape::automatic;
     bool suits_gpu = false;  ///< kernels as GPUs have them, whatever the device is
+    bool sub_groups = true;  ///< where the device has them
 };
 
 ShapedHits trace_on_device(const Bvh& bvh, const Rays& rays, const Variant& variant) {
@@ -69,6 +70,7 @@ ShapedHits trace_on_device(const Bvh& bvh, const Rays& rays, const Variant& vari
     Commands commands(*device(), token);
     if (variant.work_group) commands.work_group = variant.work_group;
     if (variant.suits_gpu) commands.suits_gpu = true;
+    if (!variant.sub_groups) commands.use_sub_groups = false;
     const auto tree = upload_tree(commands, bvh);
     return trace(commands, bvh, *tree, rays.batch(), variant.options, token, variant.shape);
 }
@@ -82,12 +84,18 @@ Bvh tree_of(const BinaryBvh& binary, std::shared_ptr<const Mesh> mesh, const std
     return collapse(binary, std::move(mesh), unsigned(std::stoi(layout)), model, token);
 }
 
-/// The CPU's answer and the device's, with the same options.
-void expect_the_cpus_hits(const Bvh& bvh, const Rays& rays, const Variant& variant,
+/// The CPU's answer and the device's, with the same options; with and without sub-groups, where the
+/// device has them and the shape has threads that talk to each other.
+void expect_the_cpus_hits(const Bvh& bvh, const Rays& rays, Variant variant,
                           const std::string& what) {
     Token token;
     const Hits expected = bvhlab::trace(bvh, rays.batch(), variant.options, token);
     expect_same(expected, trace_on_device(bvh, rays, variant), what);
+    const bool talks =
+        variant.shape == TraceShape::persistent || variant.shape == TraceShape::lanes;
+    if (!talks || !device()->info().sub_groups.usable) return;
+    variant.sub_groups = false;
+    expect_same(expected, trace_on_device(bvh, rays, variant), what + ", without sub-groups");
 }
 
 /// All layouts, closest and any hit, counted, and one order of rays each.
@@ -179,7 +187,7 @@ TEST(OpenClTrace, DoesNotDependOnTheWorkGroup) {
     const Rays aimed = aimed_rays(*mesh, 333);
     for (std::size_t i = 0; i < aimed.origins.size(); ++i)
         rays.add(aimed.origins[i], aimed.directions[i]);
-    for (const std::size_t group : {1, 7, 96}) {
+    for (const std::size_t group : {3, 7, 96}) {
         const std::string what = "groups of " + std::to_string(group);
         expect_the_cpus_hits(tree_of(binary, mesh, "4"), rays, {{.reorder = Reorder::aila}, group},
                              what);
@@ -234,6 +242,32 @@ TEST(OpenClTrace, OtherShapesDoNotDependOnTheWorkGroup) {
     for (const std::string layout : {"2", "cwbvh"})
         expect_the_cpus_hits(tree_of(binary, mesh, layout), rays, {{}, 7, other_shape(layout)},
                              layout);
+}
+
+/// Whether the kernel of a shape talks by sub-groups, with the given group.
+bool has_sub_groups(const Bvh& bvh, TraceShape shape, std::size_t group, bool wanted) {
+    Token token;
+    Commands commands(*device(), token);
+    if (group) commands.work_group = group;
+    commands.use_sub_groups = wanted;
+    return kernel_of(commands, *upload_tree(commands, bvh), shape, false).source.sub_groups;
+}
+
+TEST(OpenClTrace, ThreadsTalkBySubGroupsWhereTheDeviceHasThem) {
+    const SubGroups& sub_groups = device()->info().sub_groups;
+    if (!sub_groups.usable) GTEST_SKIP() << "no sub-groups: " << sub_groups.reason;
+    Token token;
+    const auto mesh = shared(random_soup(100));
+    const BinaryBvh binary = build_lbvh(*mesh, token);
+    for (const std::string layout : {"2", "4", "8"}) {
+        const Bvh bvh = tree_of(binary, mesh, layout);
+        EXPECT_FALSE(has_sub_groups(bvh, other_shape(layout), 0, false)) << layout;
+        EXPECT_FALSE(has_sub_groups(bvh, TraceShape::single, 0, true)) << layout;
+        // Teams must fit into sub-groups, whose size is the driver's affair.
+        if (layout == "2" || !device()->info().is_gpu) {
+            EXPECT_TRUE(has_sub_groups(bvh, other_shape(layout), 0, true)) << layout;
+        }
+    }
 }
 
 TEST(OpenClTrace, KernelsForGpusGiveTheSameHits) {
@@ -314,6 +348,23 @@ TEST(OpenClTrace, NoTreeIsTooDeep) {
         expect_the_cpus_hits(bvh, rays, {{.any_hit = true}}, layout + ", any hit");
         expect_the_cpus_hits(bvh, rays, {{.count = true}}, layout + ", counted");
         expect_the_cpus_hits(bvh, rays, {{}, 0, other_shape(layout)}, layout + ", other shape");
+    }
+}
+
+TEST(OpenClTrace, LanesGoOnWhereLocalMemoryIsFull) {
+    const DeepTree deep(3000);
+    Rays rays;
+    rays.add({0.2F, 0.2F, -1.0F}, {0, 0, 1});
+    rays.add({0.2F, 0.2F, 4000.0F}, {0, 0, -1});
+    for (const std::string layout : {"4", "8"}) {
+        Token token;
+        Commands commands(*device(), token);
+        const Bvh bvh = tree_of(deep.binary, deep.mesh, layout, {1e-3, 1e3});
+        const auto tree = upload_tree(commands, bvh);
+        const Hits hits = trace(commands, bvh, *tree, rays.batch(), {}, token, TraceShape::lanes);
+        expect_same(bvhlab::trace(bvh, rays.batch(), {}, token), hits, layout);
+        for (const KernelTime& time : commands.times().kernels)
+            EXPECT_NE(time.kernel, "traverse_carefully") << layout << ", traced again";
     }
 }
 

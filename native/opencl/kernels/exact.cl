@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Arithmetic without rounding, for decisions that double cannot make: ExactSum (base/exact_sum.h)
-// and what trace/intersect.cpp computes with it, in the same order, so that values are the host's
+// and what trace/expanded.cpp computes with it, in the same order, so that values are the host's
 // bit for bit.
 //
 // A sum is an expansion (Shewchuk 1997, section 2) in a private array. Each double that is added
@@ -81,7 +81,7 @@ __attribute__((noinline)) int exact_volume(double* parts, const float* origin,
     return add_determinant(parts, count, -1.0F, direction, origin, q);
 }
 
-// --- decisions of trace/intersect.cpp -----------------------------------------------------------
+// --- decisions of trace/expanded.cpp ------------------------------------------------------------
 
 /// The edge function of the edge between two corners; `longest` is the given direction along kz.
 double exact_edge_function(const Ray* ray, float longest, const float* from, const float* to) {

@@ -1,33 +1,42 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // 4- and 8-wide trees on GPUs: WIDTH threads for each ray, one for each child of a node or triangle
 // of a leaf (Lier, Stamminger, Selgrad 2018). Children that are entered are ranked by distance, so
-// that each thread knows its own child's place on the stack. Threads meet at barriers of the whole
-// group, whatever the device's own width is. GROUP: threads of a group, a multiple of WIDTH.
-// LANES is 1. ANY_HIT: 0 or 1. TEAM_STACK: entries of a ray's stack in local memory; a ray that
-// needs more is left undecided.
+// that each thread knows its own child's place on the stack. Threads talk by team.cl: where the
+// device has sub-groups they wait for nobody beyond their own, else for the whole group.
+// GROUP: threads of a group, a multiple of WIDTH, which is TEAM. LANES is 1. ANY_HIT: 0 or 1.
 
 #define TEAMS (GROUP / WIDTH)
 
-/// Urgency of a child that is not entered: NaN, of which every comparison is false.
+/// Urgency of a child that is not entered, and t of an undecided triangle: NaN, of which every
+/// comparison is false.
 #define NOT_ENTERED NAN
+#define UNDECIDED NAN
 
-/// What a ray's threads share.
+/// A ray's entries: the lowest in local memory, those of deep trees in global memory. What is in
+/// neither leaves the ray undecided.
 typedef struct {
-    StackEntry stack[TEAM_STACK];
-    uint top;
+    __local StackEntry* near_entries;
+    uint near_capacity;
+    __global StackEntry* far_entries;
+    uint capacity;  // of both
+} TeamStack;
+
+/// Where a team is; all of its threads have the same.
+typedef struct {
+    uint index;  // of the ray
+    Hit hit;
     StackEntry current;  // node or leaf to go on with
-    uint index;          // of the ray
-    uint state;          // one of those below
-    uint undecided;      // not 0: a triangle could not be decided
-} Team;
+    uint top;            // entries on the stack
+} Walk;
 
-enum { state_idle, state_fresh, state_tracing, state_over };
-
-/// What one thread found.
+/// Words that threads share.
 typedef struct {
-    float urgency[GROUP];  // of its child, or NOT_ENTERED
-    Hit hit[GROUP];        // of its triangles
-} Findings;
+    uint position[GROUP];  // of the ray, or NO_RAY
+    uint t[GROUP];         // of the closest hit, or a child's urgency
+    uint u[GROUP], v[GROUP], triangle[GROUP];
+} Shared;
+
+#define NO_RAY 0xFFFFFFFFU
 
 // --- one thread's share -------------------------------------------------------------------------
 
@@ -65,143 +74,165 @@ inline bool intersect_share(const Tree* tree, const PreparedRay* ray, const Ray*
     return true;
 }
 
-// --- a team's steps -----------------------------------------------------------------------------
+// --- stack --------------------------------------------------------------------------------------
 
-/// Puts the thread's child where its rank among those entered says: the most urgent is next, the
-/// others go on the stack, the least urgent first. Returns how many are entered.
-inline uint place_child(const Tree* tree, __local Team* team, uint node, uint top, uint lane,
-                        __local const float* urgency) {
-    const float own = urgency[lane];
-    uint entered = 0, rank = 0;
-    for (uint i = 0; i < WIDTH; ++i) {
-        entered += urgency[i] == urgency[i];
-        rank += urgency[i] < own || (urgency[i] == own && i < lane);
-    }
-    if (own == own && top + entered <= TEAM_STACK) {
-        const StackEntry entry = child_of(tree, node, lane, own);
-        if (rank == 0)
-            team->current = entry;
-        else
-            team->stack[top + entered - 1 - rank] = entry;
-    }
-    return entered;
+inline void put_entry(const TeamStack* stack, uint place, StackEntry entry) {
+    if (place < stack->near_capacity)
+        stack->near_entries[place] = entry;
+    else
+        stack->far_entries[place - stack->near_capacity] = entry;
 }
 
-/// The nearest of the hits that the team's threads found.
-inline void take_nearest(__local const Hit* found, Hit* hit) {
-    for (uint i = 0; i < WIDTH; ++i) {
-        const Hit other = found[i];
-        if (other.t < hit->t || (other.t == hit->t && other.triangle < hit->triangle)) *hit = other;
-    }
+inline StackEntry entry_at(const TeamStack* stack, uint place) {
+    return place < stack->near_capacity ? stack->near_entries[place]
+                                        : stack->far_entries[place - stack->near_capacity];
 }
 
 /// Makes the next entry that may matter current; false where there is none.
-inline bool next_entry(__local Team* team, const Hit* hit) {
-    while (team->top != 0) {
-        team->current = team->stack[--team->top];
-        if (ANY_HIT || !(team->current.urgency > hit->t)) return true;
+inline bool next_entry(const TeamStack* stack, Walk* walk) {
+    while (walk->top != 0) {
+        walk->current = entry_at(stack, --walk->top);
+        if (ANY_HIT || !(walk->current.urgency > walk->hit.t)) return true;
     }
     return false;
 }
 
+// --- a team's steps -----------------------------------------------------------------------------
+
+/// The children that are entered, as one thread sees them.
+typedef struct {
+    uint entered;   // how many
+    uint rank;      // of its own among them, the most urgent first
+    uint nearest;   // which
+    float urgency;  // of the nearest
+} Ranking;
+
+inline Ranking ranking_of(float own, uint lane, __local const Shared* shared) {
+    Ranking ranking = {0, 0, 0, NOT_ENTERED};
+    for (uint i = 0; i < WIDTH; ++i) {
+        const float urgency = as_float(word_of(i, as_uint(own), shared->t));
+        const bool entered = urgency == urgency, nearer = !(ranking.urgency <= urgency);
+        ranking.entered += entered;
+        ranking.rank += urgency < own || (urgency == own && i < lane);
+        ranking.nearest = entered && nearer ? i : ranking.nearest;
+        ranking.urgency = entered && nearer ? urgency : ranking.urgency;
+    }
+    return ranking;
+}
+
+/// Goes on with the most urgent child; each thread puts its own where its rank says, the least
+/// urgent first. False where the stack has no room.
+inline bool enter_children(const Tree* tree, const TeamStack* stack, const Ranking* ranking,
+                           float own, uint lane, Walk* walk) {
+    const uint node = walk->current.child, end = walk->top + ranking->entered - 1;
+    if (end > stack->capacity) return false;
+    if (own == own && ranking->rank != 0)
+        put_entry(stack, end - ranking->rank, child_of(tree, node, lane, own));
+    walk->current = child_of(tree, node, ranking->nearest, ranking->urgency);
+    walk->top = end;
+    return true;
+}
+
+/// The nearest of the hits that the team's threads found. False where one is undecided.
+inline bool take_nearest(Hit own, __local const Shared* shared, Hit* nearest) {
+    bool decided = true;
+    uint from = 0;
+    for (uint i = 0; i < WIDTH; ++i) {
+        const float t = as_float(word_of(i, as_uint(own.t), shared->t));
+        const uint triangle = word_of(i, own.triangle, shared->triangle);
+        decided = decided && t == t;
+        if (i != 0 && !(t < nearest->t || (t == nearest->t && triangle < nearest->triangle)))
+            continue;
+        nearest->t = t;
+        nearest->triangle = triangle;
+        from = i;
+    }
+    nearest->u = as_float(word_of(from, as_uint(own.u), shared->u));
+    nearest->v = as_float(word_of(from, as_uint(own.v), shared->v));
+    return decided;
+}
+
 kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void traverse_lanes(
-    __global const Node* nodes, __global const float* leaves, __global const uint* triangles,
-    Box bounds,  // of the mesh
-    __global const Ray* rays,
-    __global const uint* order,  // rays in the order in which to trace them
-    uint ordered,                // 0: as they come, without `order`
-    uint first,                  // rays before these were traced
-    uint end,
-    __global Hit* hits,             // by ray; not for any hit
-    __global uchar* occluded,       // by ray; any hit only
-    __global uint* undecided_rays,  // their number, then the rays
-    __global uint* fetched) {       // rays taken, 0 at first
-    __local Team teams[TEAMS];
-    __local Findings findings;
-    __local uint working;  // teams that are not over
-    const uint thread = (uint)get_local_id(0);
-    const uint lane = thread % WIDTH;
-    const uint team_first = thread - lane;
-    __local Team* const team = &teams[thread / WIDTH];
+    TRACE_ARGUMENTS,
+    __global uint* fetched,           // rays taken, 0 at first
+    __local StackEntry* near_stacks,  // near_capacity for each team
+    uint near_capacity,
+    __global StackEntry* far_stacks,  // far_capacity for each team
+    uint far_capacity) {
+    __local Shared shared;
+    const uint thread = thread_of_group();
+    const uint lane = thread % WIDTH, team = thread / WIDTH;
     const Tree tree = {nodes, leaves, triangles};
-    Ray given = {{0.0F, 0.0F, 0.0F}, 0.0F, {0.0F, 0.0F, 0.0F}, 0.0F};
+    const TeamStack stack = {near_stacks + team * near_capacity, near_capacity,
+                             far_stacks + ((size_t)get_group_id(0) * TEAMS + team) * far_capacity,
+                             near_capacity + far_capacity};
+    Ray given;
     PreparedRay ray;
-    Hit hit;  // the team's, in each of its threads
-    if (thread == 0) working = TEAMS;
-    if (lane == 0) team->state = state_idle;
-    uint left;
-    barrier(CLK_LOCAL_MEM_FENCE);
+    Walk walk;
+    uint position = 0;
+    bool idle = true, left;
     do {
-        // The first thread of a team without a ray takes the next.
-        if (lane == 0 && team->state == state_idle) {
-            const uint taken = atomic_inc(fetched);
-            if (taken < end - first) {
-                team->index = ordered ? order[first + taken] : first + taken;
-                team->state = state_fresh;
-                team->top = 0;
-                team->undecided = 0;
-                team->current = (StackEntry){0.0F, 0, 0};
-            } else {
-                team->state = state_over;
-                atomic_dec(&working);
-            }
+        // Teams without a ray take the next.
+        const bool fetches = idle && lane == 0 && position != NO_RAY;
+        const uint taken = take_next(fetches, fetched);
+        if (fetches) position = taken < end - first ? first + taken : NO_RAY;
+        put_word(position, shared.position);
+        MEET();
+        position = word_of(0, position, shared.position);
+        left = any_put_but(NO_RAY, position, shared.position);
+        if (idle && position != NO_RAY) {
+            walk.index = ordered ? order[position] : position;
+            given = rays[walk.index];
+            ray = prepared(&given, &bounds);
+            walk.hit = (Hit){ray.t_max, 0.0F, 0.0F, NO_TRIANGLE};
+            walk.current = (StackEntry){ray.t_min, 0, 0};
+            walk.top = 0;
+            idle = false;
         }
-        barrier(CLK_LOCAL_MEM_FENCE);
-        left = working;  // nobody writes to it until all have passed the end of this step
 
         // Each thread tests its child or its triangles.
-        const uint state = team->state, top = team->top;
-        const StackEntry current = team->current;
-        if (state == state_fresh) {
-            given = rays[team->index];
-            ray = prepared(&given, &bounds);
-            hit = (Hit){ray.t_max, 0.0F, 0.0F, NO_TRIANGLE};
+        const bool tests = !idle && given.t_min <= given.t_max;
+        const bool at_node = tests && walk.current.count == 0, at_leaf = tests && !at_node;
+        Hit own = {NOT_ENTERED, 0.0F, 0.0F, NO_TRIANGLE};
+        if (at_node) own.t = urgency_of(&nodes[walk.current.child], lane, &ray, walk.hit.t);
+        if (at_leaf) {
+            own = walk.hit;
+            if (!intersect_share(&tree, &ray, &given, &walk.current, lane, &own)) own.t = UNDECIDED;
         }
-        const bool tests = state != state_over && given.t_min <= given.t_max;
-        if (tests) {
-            if (current.count == 0) {
-                findings.urgency[thread] = urgency_of(&nodes[current.child], lane, &ray, hit.t);
-            } else {
-                Hit own = hit;
-                if (!intersect_share(&tree, &ray, &given, &current, lane, &own))
-                    team->undecided = 1;
-                findings.hit[thread] = own;
-            }
+        put_word(as_uint(own.t), shared.t);
+        if (at_leaf) {
+            put_word(as_uint(own.u), shared.u);
+            put_word(as_uint(own.v), shared.v);
+            put_word(own.triangle, shared.triangle);
         }
-        barrier(CLK_LOCAL_MEM_FENCE);
+        MEET();
 
-        // What they found becomes the team's; the first thread looks after stack and result.
-        if (state != state_over) {
-            bool more = false, decided = true;
-            if (tests && current.count == 0) {
-                const uint entered = place_child(&tree, team, current.child, top, lane,
-                                                 &findings.urgency[team_first]);
-                decided = top + entered <= TEAM_STACK;
-                if (lane == 0) {
-                    if (entered != 0) team->top = top + entered - 1;
-                    more = entered != 0 || next_entry(team, &hit);
-                }
-            } else if (tests) {
-                take_nearest(&findings.hit[team_first], &hit);
-                decided = team->undecided == 0;
-                const bool ends = ANY_HIT && hit.triangle != NO_TRIANGLE;
-                if (lane == 0) more = !ends && next_entry(team, &hit);
-            }
-            if (lane == 0) {
-                team->state = state_tracing;
-                if (!decided || !more) {
-                    team->state = state_idle;
-                    if (!decided) {
-                        undecided_rays[1 + atomic_inc(undecided_rays)] = team->index;
-                    } else if (ANY_HIT) {
-                        occluded[team->index] = hit.triangle != NO_TRIANGLE;
-                    } else {
-                        finish_hit(&given, ray.unscale, &hit);
-                        hits[team->index] = hit;
-                    }
-                }
+        // What they found becomes the team's.
+        bool decided = true, more = tests;
+        if (takes_part(at_node)) {
+            const Ranking ranking = ranking_of(own.t, lane, &shared);
+            if (at_node) {
+                if (ranking.entered == 0)
+                    more = next_entry(&stack, &walk);
+                else
+                    decided = enter_children(&tree, &stack, &ranking, own.t, lane, &walk);
             }
         }
-        barrier(CLK_LOCAL_MEM_FENCE);
-    } while (left != 0);
+        if (takes_part(at_leaf)) {
+            Hit nearest;
+            const bool all_decided = take_nearest(own, &shared, &nearest);
+            if (at_leaf) {
+                walk.hit = nearest;
+                decided = all_decided;
+                more = !(ANY_HIT && nearest.triangle != NO_TRIANGLE) && next_entry(&stack, &walk);
+            }
+        }
+        if (!idle && !(decided && more)) {
+            idle = true;
+            if (lane == 0) {
+                if (decided && !ANY_HIT) finish_hit(&given, ray.unscale, &walk.hit);
+                put_answer(walk.index, walk.hit, decided, hits, occluded, undecided_rays);
+            }
+        }
+    } while (left);
 }

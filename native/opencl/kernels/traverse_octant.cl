@@ -82,17 +82,7 @@ inline Hit trace_octants(const Tree* tree, const Box* bounds, const Ray* given, 
     return hit;
 }
 
-kernel void traverse_octant(__global const Node* nodes, __global const float* leaves,
-                            __global const uint* triangles,
-                            Box bounds,  // of the mesh
-                            __global const Ray* rays,
-                            __global const uint* order,  // rays in the order to trace them in
-                            uint ordered,                // 0: as they come, without `order`
-                            uint first,                  // rays before these were traced
-                            uint end,
-                            __global Hit* hits,               // by ray; not for any hit
-                            __global uchar* occluded,         // by ray; any hit only
-                            __global uint* undecided_rays) {  // their number, then the rays
+kernel void traverse_octant(TRACE_ARGUMENTS) {
     const uint position = first + (uint)get_global_id(0);
     if (position >= end) return;
     const uint index = ordered ? order[position] : position;
@@ -100,10 +90,5 @@ kernel void traverse_octant(__global const Node* nodes, __global const float* le
     const Ray ray = rays[index];
     bool decided;
     const Hit hit = trace_octants(&tree, &bounds, &ray, &decided);
-    if (!decided)
-        undecided_rays[1 + atomic_inc(undecided_rays)] = index;
-    else if (ANY_HIT)
-        occluded[index] = hit.triangle != NO_TRIANGLE;
-    else
-        hits[index] = hit;
+    put_answer(index, hit, decided, hits, occluded, undecided_rays);
 }

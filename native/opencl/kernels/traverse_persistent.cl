@@ -3,8 +3,8 @@
 // the next ray as soon as its own has ended (dynamic fetch: Aila, Laine, Karras 2012), and a leaf
 // that is postponed while there are nodes to visit. ANY_HIT: 0 or 1.
 //
-// A thread visits nodes until it holds two leaves; without votes among threads of unknown width
-// that stands for the vote which ends the node phase there.
+// With sub-groups their threads take rays together, and vote: nodes are visited while one of them
+// has yet to find a leaf. Without, a thread visits nodes until it holds two leaves.
 
 /// What a thread is busy with.
 typedef struct {
@@ -12,8 +12,9 @@ typedef struct {
     Ray given;
     PreparedRay ray;
     Hit hit;
-    StackEntry current;  // node or leaf to go on with
-    bool more;           // `current` is there
+    StackEntry current;    // node or leaf to go on with
+    bool more;             // `current` is there
+    StackEntry postponed;  // leaf to be intersected; of no references where there is none
 } Task;
 
 /// The next entry that may matter; false where there is none.
@@ -34,74 +35,80 @@ inline void begin(Task* task, const Box* bounds, Stack* stack) {
     stack->top = 0;
 }
 
-/// Visits nodes until the task ends in a second leaf or in nothing; the first leaf is `postponed`.
-/// False where the stack has no room.
-inline bool visit_nodes(const Tree* tree, Task* task, Stack* stack, StackEntry* postponed) {
-    while (task->more && task->current.count == 0) {
-        if (!has_room(stack)) return false;
-        if (!descend(tree, &task->ray, task->hit.t, ANY_HIT, &task->current, stack))
-            task->more = next_entry(stack, &task->hit, &task->current);
-        if (task->more && task->current.count != 0 && postponed->count == 0) {
-            *postponed = task->current;
-            task->more = next_entry(stack, &task->hit, &task->current);
-        }
+/// Whether nodes are to be visited, by this thread or another that votes.
+inline bool visits_nodes(const Task* task) {
+#ifdef HAS_SUB_GROUPS
+    return vote(task->more && task->postponed.count == 0);
+#else
+    return task->more && task->current.count == 0;
+#endif
+}
+
+/// Visits the current node unless it is a second leaf; the first is postponed. False where the
+/// stack has no room.
+inline bool visit_node(const Tree* tree, Task* task, Stack* stack) {
+    if (!task->more || task->current.count != 0) return true;
+    if (!has_room(stack)) {
+        task->more = false;
+        return false;
+    }
+    if (!descend(tree, &task->ray, task->hit.t, ANY_HIT, &task->current, stack))
+        task->more = next_entry(stack, &task->hit, &task->current);
+    if (task->more && task->current.count != 0 && task->postponed.count == 0) {
+        task->postponed = task->current;
+        task->more = next_entry(stack, &task->hit, &task->current);
     }
     return true;
 }
 
 /// Intersects the postponed leaf and those that follow it. False where a triangle is undecided.
-inline bool visit_leaves(const Tree* tree, Task* task, Stack* stack, StackEntry* postponed) {
-    while (postponed->count != 0) {
-        if (!intersect_leaf(tree, &task->ray, &task->given, postponed, ANY_HIT, &task->hit))
+inline bool visit_leaves(const Tree* tree, Task* task, Stack* stack) {
+    while (task->postponed.count != 0) {
+        if (!intersect_leaf(tree, &task->ray, &task->given, &task->postponed, ANY_HIT, &task->hit))
             return false;
-        postponed->count = 0;
+        task->postponed.count = 0;
         if (ANY_HIT && task->hit.triangle != NO_TRIANGLE) task->more = false;
         if (task->more && task->current.count != 0) {
-            *postponed = task->current;
+            task->postponed = task->current;
             task->more = next_entry(stack, &task->hit, &task->current);
         }
     }
     return true;
 }
 
-kernel void traverse_persistent(__global const Node* nodes, __global const float* leaves,
-                                __global const uint* triangles,
-                                Box bounds,  // of the mesh
-                                __global const Ray* rays,
-                                __global const uint* order,  // rays in the order to trace them in
-                                uint ordered,                // 0: as they come, without `order`
-                                uint first,                  // rays before these were traced
-                                uint end,
-                                __global Hit* hits,             // by ray; not for any hit
-                                __global uchar* occluded,       // by ray; any hit only
-                                __global uint* undecided_rays,  // their number, then the rays
-                                __global uint* fetched) {       // rays taken, 0 at first
+kernel void traverse_persistent(TRACE_ARGUMENTS,
+                                __global uint* fetched) {  // rays taken, 0 at first
     const Tree tree = {nodes, leaves, triangles};
     Stack stack;
     Task task;
-    StackEntry postponed = {0.0F, 0, 0};
-    bool busy = false;
-    for (;;) {
-        if (!busy) {
-            const uint taken = atomic_inc(fetched);
-            if (taken >= end - first) return;
+    task.more = false;
+    task.postponed.count = 0;
+    bool busy = false, over = false, works;
+    do {
+        // Threads without a ray take the next.
+        const bool fetches = !busy && !over;
+        const uint taken = take_next(fetches, fetched);
+        if (fetches) {
+            busy = taken < end - first;
+            over = !busy;
+        }
+        if (fetches && busy) {
             task.index = ordered ? order[first + taken] : first + taken;
             task.given = rays[task.index];
             begin(&task, &bounds, &stack);
-            busy = true;
         }
-        bool decided = visit_nodes(&tree, &task, &stack, &postponed);
-        decided = decided && visit_leaves(&tree, &task, &stack, &postponed);
-        if (decided && task.more) continue;
-        busy = false;
-        postponed.count = 0;
-        if (!decided) {
-            undecided_rays[1 + atomic_inc(undecided_rays)] = task.index;
-        } else if (ANY_HIT) {
-            occluded[task.index] = task.hit.triangle != NO_TRIANGLE;
-        } else {
-            finish_hit(&task.given, task.ray.unscale, &task.hit);
-            hits[task.index] = task.hit;
+        works = vote(busy);
+
+        bool decided = true;
+        do {
+            decided = visit_node(&tree, &task, &stack) && decided;
+        } while (visits_nodes(&task));
+        decided = decided && visit_leaves(&tree, &task, &stack);
+        if (busy && !(decided && task.more)) {
+            busy = task.more = false;
+            task.postponed.count = 0;
+            if (decided && !ANY_HIT) finish_hit(&task.given, task.ray.unscale, &task.hit);
+            put_answer(task.index, task.hit, decided, hits, occluded, undecided_rays);
         }
-    }
+    } while (works);
 }

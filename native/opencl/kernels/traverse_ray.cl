@@ -159,3 +159,33 @@ inline Hit trace_ray(const Tree* tree, const Box* bounds, const Ray* given, bool
     work->undecided = true;
     return hit;
 }
+
+// --- kernels of all shapes ----------------------------------------------------------------------
+#ifndef CAREFUL
+
+/// Their first arguments:
+///   nodes, leaves, triangles  of the tree
+///   bounds                    of the mesh
+///   rays, order               rays in the order in which to trace them, if `ordered` is not 0
+///   first, end                positions to trace
+///   hits                      by ray; not for any hit
+///   occluded                  by ray; any hit only
+///   undecided_rays            their number, then the rays
+#define TRACE_ARGUMENTS                                                                       \
+    __global const Node *nodes, __global const float *leaves, __global const uint *triangles, \
+        Box bounds, __global const Ray *rays, __global const uint *order, uint ordered,       \
+        uint first, uint end, __global Hit *hits, __global uchar *occluded,                   \
+        __global uint *undecided_rays
+
+/// A ray's answer, or that it has none.
+inline void put_answer(uint ray, Hit hit, bool decided, __global Hit* hits,
+                       __global uchar* occluded, __global uint* undecided_rays) {
+    if (!decided)
+        undecided_rays[1 + atomic_inc(undecided_rays)] = ray;
+    else if (ANY_HIT)
+        occluded[ray] = hit.triangle != NO_TRIANGLE;
+    else
+        hits[ray] = hit;
+}
+
+#endif
