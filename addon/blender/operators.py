@@ -17,7 +17,7 @@ from ..study.spreadsheet import rows_csv
 from ..study.table import text_report
 from . import images, preferences, store, summary
 from .extract import extract_scene
-from .properties import COLUMNS
+from .panel_state import COLUMNS
 from .session import program
 from .text import sentence
 

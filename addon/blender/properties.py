@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings kept in the file, ``Scene.bvh_lab``; the panel's state, ``WindowManager.bvh_lab``."""
+"""Settings kept in the file, ``Scene.bvh_lab``."""
 
 from __future__ import annotations
 
@@ -9,12 +9,10 @@ from collections.abc import Iterable
 import bpy
 from bpy.props import (
     BoolProperty,
-    CollectionProperty,
     EnumProperty,
     FloatProperty,
     IntProperty,
     PointerProperty,
-    StringProperty,
 )
 
 from ..study.devices import CPU, described
@@ -23,7 +21,6 @@ from ..study.precision import BOX_TESTS, LAYOUTS, TRIANGLE_TESTS
 from . import preferences, store
 
 QUICK = Plan()
-COLUMNS = ("NAME", "BUILD", "COST", "SPEED", "RATIO", "WRONG")
 
 _devices: list[tuple[str, str, str, int]] = []  # Blender keeps no reference to the strings
 
@@ -39,14 +36,6 @@ def _device_items(
                 name = f"{'CPU' if device['id'] == CPU else 'OpenCL'}, {device['name']}"
                 _devices.append((device["id"], name, described(device), number))
     return _devices or [("cpu", "CPU", "The processor", 0)]
-
-
-def _percent(panel: BVHLAB_PG_panel) -> float:
-    return 100.0 * store.running.job.fraction if store.running else 0.0
-
-
-def _ignore(panel: BVHLAB_PG_panel, value: float) -> None:
-    """The bar shows; it does not set."""
 
 
 class BVHLAB_PG_settings(bpy.types.PropertyGroup):
@@ -323,81 +312,14 @@ class BVHLAB_PG_settings(bpy.types.PropertyGroup):
         return [name for name in names if getattr(self, f"{group}_{name}")]
 
 
-class BVHLAB_PG_row(bpy.types.PropertyGroup):
-    """A row of the table, by scene and variant; its numbers are in the store."""
-
-    scene: StringProperty()
-
-
-class BVHLAB_PG_panel(bpy.types.PropertyGroup):
-    """How the table is shown. Never saved, never undone."""
-
-    rows: CollectionProperty(type=BVHLAB_PG_row)
-    active: IntProperty(name="Variant", description="The variant of which the details are shown")
-    sort_column: EnumProperty(
-        items=[(name, name.title(), "", i) for i, name in enumerate(COLUMNS)], default="SPEED"
-    )
-    sort_reverse: BoolProperty(default=True)
-    baseline: StringProperty()
-    kind: EnumProperty(
-        name="Rays",
-        description="Which rays the table's speeds are of",
-        items=[
-            ("primary", "Primary", "Closest hit of one ray through each pixel", 0),
-            ("secondary", "Secondary", "Closest hit of the rays that surfaces send on", 1),
-            ("shadow", "Shadow", "Any hit towards lights, from all that was hit", 2),
-        ],
-    )
-    progress: FloatProperty(
-        name="Progress",
-        description="Finished part of the comparison",
-        subtype="PERCENTAGE",
-        precision=0,
-        min=0.0,
-        max=100.0,
-        get=_percent,
-        set=_ignore,  # without one Blender greys the bar out
-    )
-
-    def show(self, scene: str, names: list[str]) -> None:
-        """Make the table's rows of one scene those named."""
-        old = [index for index, row in enumerate(self.rows) if row.scene == scene]
-        if [self.rows[index].name for index in old] == names:
-            return
-        for index in reversed(old):
-            self.rows.remove(index)
-        for name in names:
-            row = self.rows.add()
-            row.name, row.scene = name, scene
-
-    def active_name(self, scene: str) -> str:
-        """Variant that is selected, if it is one of this scene's."""
-        if 0 <= self.active < len(self.rows) and self.rows[self.active].scene == scene:
-            return str(self.rows[self.active].name)
-        return ""
-
-    def select(self, scene: str, name: str) -> None:
-        """Select a variant of a scene."""
-        for index, row in enumerate(self.rows):
-            if (row.scene, row.name) == (scene, name):
-                self.active = index
-
-
-CLASSES = (BVHLAB_PG_settings, BVHLAB_PG_row, BVHLAB_PG_panel)
-
-
 def register() -> None:
-    """Put the settings on every scene and the panel's state on the window manager."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
+    """Put the settings on every scene."""
+    bpy.utils.register_class(BVHLAB_PG_settings)
     bpy.types.Scene.bvh_lab = PointerProperty(type=BVHLAB_PG_settings)
-    bpy.types.WindowManager.bvh_lab = PointerProperty(type=BVHLAB_PG_panel, options={"SKIP_SAVE"})
 
 
 def unregister() -> None:
-    """Take them away; the settings' values stay in the file for the next time."""
-    del bpy.types.WindowManager.bvh_lab
+    """Take them away; their values stay in the file for the next time."""
     del bpy.types.Scene.bvh_lab
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    bpy.utils.unregister_class(BVHLAB_PG_settings)
     _devices.clear()

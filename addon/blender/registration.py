@@ -10,6 +10,7 @@ from . import (
     engine_settings,
     handlers,
     operators,
+    panel_state,
     panels,
     preferences,
     properties,
@@ -18,6 +19,7 @@ from . import (
 MODULES = (
     preferences,
     properties,
+    panel_state,
     engine_settings,
     operators,
     panels,

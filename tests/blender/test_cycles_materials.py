@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 from blender_support import add_camera, add_light, use_nodes
 from cycles_support import CyclesTest
-from test_textures import picture, uv_square
+from texture_support import picture, uv_square
 
 BLOCKS = 4
 

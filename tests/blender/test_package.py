@@ -68,13 +68,12 @@ class Package(unittest.TestCase):
 
     def test_tooltips_end_without_a_dot(self) -> None:
         import bvh_lab
-        from bvh_lab.blender import properties
+        from bvh_lab.blender import panel_state, properties
 
         bvh_lab.register()
         try:
-            texts = [
-                prop.description for group in properties.CLASSES for prop in group.bl_rna.properties
-            ]
+            groups = (properties.BVHLAB_PG_settings, *panel_state.CLASSES)
+            texts = [prop.description for group in groups for prop in group.bl_rna.properties]
             texts += [
                 cls.bl_description
                 for name in dir(bpy.types)

@@ -1,81 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Textures: which pictures are looked up, how, and where."""
+"""Textures: which pictures are looked up, and how."""
 
 from __future__ import annotations
 
-import math
 import tempfile
 import unittest
 from pathlib import Path
 
 import bpy
 import numpy as np
-from blender_support import EmptySceneTest, add_camera, add_material, add_mesh, link
-
-
-def picture(
-    name: str, width: int, height: int, float_buffer: bool = False, opaque: bool = False
-) -> bpy.types.Image:
-    """A generated image of which no texel is like another, opaque in the lower left half or all."""
-    image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=float_buffer)
-    rows, columns = np.mgrid[0:height, 0:width]
-    texels = np.ones((height, width, 4), np.float32)
-    texels[:, :, 0] = (columns + 1) / width
-    texels[:, :, 1] = (rows + 1) / height
-    texels[:, :, 2] = ((columns + 2 * rows) % 3) / 2
-    texels[:, :, 3] = opaque | (columns / width + rows / height < 0.75)
-    if not float_buffer:
-        texels = np.rint(texels * 255) / 255
-    image.pixels.foreach_set(texels.ravel())
-    image.update()
-    return image
-
-
-def uv_square(name: str, size: float) -> bpy.types.Object:
-    """A square in the XY plane whose UV map is the unit square."""
-    half = size / 2
-    corners = [(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)]
-    square = add_mesh(name, corners, [(0, 1, 2, 3)])
-    layer = square.data.uv_layers.new(name="UVMap")
-    for loop, uv in zip(layer.data, ((0, 0), (1, 0), (1, 1), (0, 1)), strict=True):
-        loop.uv = uv
-    return square
-
-
-class TextureTest(EmptySceneTest):
-    """A square with a principled material 'M'."""
-
-    def setUp(self) -> None:
-        super().setUp()
-        self.square = uv_square("Square", 2.0)
-        self.tree = add_material("M").node_tree
-        self.square.data.materials.append(bpy.data.materials["M"])
-        self.inputs = self.tree.nodes["Principled BSDF"].inputs
-
-    def new(self, kind: str) -> bpy.types.Node:
-        return self.tree.nodes.new("ShaderNode" + kind)
-
-    def image(self, image: bpy.types.Image | None = None, to: str = "Base Color"):
-        node = self.new("TexImage")
-        node.image = image or picture("Test", 3, 2)
-        self.tree.links.new(node.outputs[0], self.inputs[to])
-        return node
-
-    def part(self):
-        self.scene = self.extract()
-        material = next(material for material in self.scene.materials if material.name == "M")
-        return material.components[0]
-
-    def said(self, text: str) -> bool:
-        return any(text in note for note in self.scene.notes)
-
-    def core_scene(self):
-        """The scene in the core, and what was said about missing textures."""
-        from bvh_lab.native import core
-        from bvh_lab.study.core_scene import core_scene
-
-        self.scene = self.extract()
-        return core_scene(core, core.Mesh(self.scene.vertices, self.scene.triangles), self.scene)
+from texture_support import TextureTest, picture
 
 
 class Images(TextureTest):
@@ -324,120 +258,6 @@ class Lookups(TextureTest):
         self.tree.links.new(mix.outputs[0], self.inputs["Base Color"])
         self.part()
         self.assertTrue(self.said("Approximated: product of two textures: M"))
-
-
-class Coordinates(TextureTest):
-    def test_uv_of_each_corner(self) -> None:
-        self.image()
-        self.part()
-        scene = self.scene
-        self.assertEqual((scene.uvs.dtype, scene.uvs.shape), (np.float32, (2, 3, 2)))
-        corners = scene.vertices[scene.triangles][:, :, :2]
-        np.testing.assert_allclose(scene.uvs, (corners + 1) / 2, atol=1e-6)
-
-    def test_mirrored_object_keeps_corners_together(self) -> None:
-        self.image()
-        self.square.scale = (-1, 1, 1)
-        self.part()
-        corners = self.scene.vertices[self.scene.triangles][:, :, :2] * (-1, 1)
-        np.testing.assert_allclose(self.scene.uvs, (corners + 1) / 2, atol=1e-6)
-
-    def test_only_where_textures_are(self) -> None:
-        self.part()
-        self.assertIsNone(self.scene.uvs)
-        self.assertEqual(self.scene.textures, [])
-        self.image()
-        plain = uv_square("Plain", 1.0)
-        plain.data.materials.append(add_material("Plain"))
-        self.part()
-        np.testing.assert_array_equal(self.scene.uvs[2:], 0)
-
-    def test_mesh_without_a_map(self) -> None:
-        self.image()
-        bare = add_mesh("Bare", [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)])
-        bare.data.materials.append(bpy.data.materials["M"])
-        self.square.hide_set(True)
-        self.part()
-        np.testing.assert_array_equal(self.scene.uvs, np.zeros((1, 3, 2)))
-        self.core_scene()
-
-    def test_named_and_rendered_maps(self) -> None:
-        other = self.square.data.uv_layers.new(name="Other")
-        for loop in other.data:
-            loop.uv = (0.25, 0.75)
-        node = self.image()
-        uv_map = self.new("UVMap")
-        uv_map.uv_map = "Other"
-        self.tree.links.new(uv_map.outputs[0], node.inputs["Vector"])
-        self.part()
-        np.testing.assert_array_equal(self.scene.uvs[0, 0], (0.25, 0.75))
-        uv_map.uv_map = ""
-        self.part()
-        self.assertEqual(float(self.scene.uvs.max()), 1.0)
-        self.square.data.uv_layers["Other"].active_render = True
-        self.part()
-        np.testing.assert_array_equal(self.scene.uvs[0, 0], (0.25, 0.75))
-        uv_map.uv_map = "UVMap"
-        second = self.image(to="Roughness")
-        self.part()
-        self.assertTrue(self.said("Approximated: several UV maps by the first: M"))
-        self.assertEqual(second.type, "TEX_IMAGE")
-
-    def test_mapping(self) -> None:
-        node, mapping, uv_map = self.image(), self.new("Mapping"), self.new("UVMap")
-        self.tree.links.new(uv_map.outputs[0], mapping.inputs["Vector"])
-        self.tree.links.new(mapping.outputs[0], node.inputs["Vector"])
-        mapping.inputs["Location"].default_value = (0.5, 0.25, 3)
-        mapping.inputs["Rotation"].default_value = (0, 0, math.pi / 2)
-        mapping.inputs["Scale"].default_value = (2, 4, 1)
-        np.testing.assert_allclose(
-            self.part().color.mapping, [[0, -4, 0.5], [2, 0, 0.25]], atol=1e-6
-        )
-        mapping.vector_type = "TEXTURE"  # the inverse: moved back, turned back, shrunk
-        np.testing.assert_allclose(
-            self.part().color.mapping, [[0, 0.5, -0.125], [-0.25, 0, 0.125]], atol=1e-6
-        )
-        mapping.vector_type = "VECTOR"
-        np.testing.assert_allclose(self.part().color.mapping, [[0, -4, 0], [2, 0, 0]], atol=1e-6)
-
-    def test_other_coordinates_are_said(self) -> None:
-        node, coordinates = self.image(), self.new("TexCoord")
-        self.tree.links.new(coordinates.outputs["Object"], node.inputs["Vector"])
-        self.part()
-        self.assertTrue(self.said("Approximated: texture coordinates 'Object' by the UV map: M"))
-        self.tree.links.new(coordinates.outputs["UV"], node.inputs["Vector"])
-        node.projection = "BOX"
-        self.part()
-        self.assertTrue(self.said("Approximated: box projection by a flat one: M"))
-
-    def test_instances_with_other_materials_have_other_maps(self) -> None:
-        other = self.square.data.uv_layers.new(name="Other")
-        for loop in other.data:
-            loop.uv = (0.25, 0.75)
-        self.image()
-        material = add_material("N")
-        tree = material.node_tree
-        node, uv_map = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeUVMap")
-        node.image, uv_map.uv_map = bpy.data.images["Test"], "Other"
-        tree.links.new(uv_map.outputs[0], node.inputs["Vector"])
-        tree.links.new(node.outputs[0], tree.nodes["Principled BSDF"].inputs["Base Color"])
-        twin = link(bpy.data.objects.new("Twin", self.square.data))
-        twin.material_slots[0].link, twin.material_slots[0].material = "OBJECT", material
-        self.part()
-        self.assertIn("2 objects and instances, 1 distinct", self.scene.notes[0])
-        is_twin = self.scene.material_index == next(
-            index for index, found in enumerate(self.scene.materials) if found.name == "N"
-        )
-        np.testing.assert_array_equal(
-            self.scene.uvs[is_twin], np.broadcast_to((0.25, 0.75), (2, 3, 2))
-        )
-        self.assertEqual(float(self.scene.uvs[~is_twin].max()), 1.0)
-
-    def test_render_geometry_has_them_too(self) -> None:
-        add_camera()
-        self.image()
-        scene = self.extract("render")
-        self.assertEqual(float(scene.uvs.max()), 1.0)
 
 
 if __name__ == "__main__":

@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import math
-import threading
-import time
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,7 +11,6 @@ import numpy as np
 import pytest
 from bvh_lab.native import core
 from bvh_lab.study import run
-from bvh_lab.study.job import Job
 from bvh_lab.study.precision import BOX_TESTS, LAYOUTS, TRIANGLE_TESTS
 from bvh_lab.study.progress import Event, RowChanged, Step
 from bvh_lab.study.results import COUNTERS, KINDS, Result
@@ -384,40 +381,3 @@ def test_rays_that_do_not_fit_are_refused() -> None:
 def test_unknown_views_are_named() -> None:
     with pytest.raises(ValueError, match="unknown view 'Nave'; there are: auto_1, auto_2, auto_3"):
         compare(sample_scene(), small_plan(views=["Nave"]))
-
-
-def test_a_job_polls_and_ends() -> None:
-    job = Job(sample_scene(), small_plan(builders=["sah"]))
-    while job.running:
-        job.wait(0.01)
-        job.poll()
-    job.poll()
-    assert job.fraction > 0.5 and job.stage and job.seconds_left >= 0.0
-    assert not job.study.result.failed()
-
-
-def test_a_job_hands_over_its_error() -> None:
-    job = Job(sample_scene(cameras=[]), small_plan())
-    job.wait(60.0)
-    with pytest.raises(ValueError, match="has no camera"):
-        _ = job.study
-
-
-def test_cancel_keeps_the_rows_measured() -> None:
-    job = Job(sample_scene(), small_plan(repeats=300, ray_long_side=16, embree=False))
-    while job.fraction < 0.05 or not job.stage.startswith("timing"):
-        job.wait(0.005)
-        job.poll()
-    start = time.perf_counter()
-    job.cancel()
-    result = job.study.result
-    assert time.perf_counter() - start < 0.5
-    assert result.cancelled and len(result.rows) == 4
-    assert result.rows[0].speed("primary") and not result.failed()
-    assert Result.from_json(result.to_json()) == result
-
-
-def test_a_job_leaves_no_thread() -> None:
-    before = threading.active_count()
-    job = Job(sample_scene(), small_plan(builders=["lbvh"], embree=False, pictures=False))
-    assert job.study.result.rows and threading.active_count() == before
