@@ -36,7 +36,7 @@ compare: check-scene build ## compare BVHs on SCENE=file (.blend, .npz, .obj, .p
 check-scene:
 	$(if $(shell test -f "$(SCENE)" && echo yes),,$(error no such scene file: $(SCENE)))@:
 
-test: lint test-native test-python test-files test-bpy test-blender test-ui ## run every test, fast ones first; stops at the first layer that fails
+test: lint test-native test-python test-files test-bpy test-blender test-ui test-fuzz test-sanitize ## run every test, fast ones first; stops at the first layer that fails
 
 lint: build ## check format, style and types
 	@$(CPP_FILES) | xargs .venv/bin/clang-format --dry-run -Werror
@@ -48,10 +48,10 @@ test-native: build ## tests of the C++ core
 	@ctest --test-dir build --parallel 2 --no-tests=error --output-on-failure --timeout 600
 
 test-python: build ## tests of the Python API and of the study, without Blender
-	@$(PYTHON) -m pytest tests/python
+	@$(PYTHON) -m pytest -n 2 --dist loadfile tests/python
 
 test-bpy: build ## tests of the Blender side in the newest Blender, as the bpy module
-	@$(PYTHON) -m pytest tests/blender
+	@$(PYTHON) -m pytest -n 2 tests/blender
 
 test-blender: build ## the same tests in Debian's Blender
 	@$(BLENDER) --factory-startup --python-exit-code 1 --python tests/blender/run.py
@@ -63,7 +63,7 @@ test-ui: build ## tests of the panel in a Blender with a window (Xvfb)
 test-sanitize: setup ## the C++ tests under address, undefined behaviour and thread sanitizer
 	@for preset in sanitize sanitize-thread; do \
 		cmake --preset $$preset --log-level=WARNING && cmake --build --preset $$preset && \
-		ctest --test-dir build-$$preset --exclude-regex '^OpenCl' --parallel 2 --no-tests=error --output-on-failure --timeout 600 || exit 1; done
+		ctest --test-dir build-$$preset --parallel 2 --no-tests=error --output-on-failure --timeout 600 || exit 1; done
 
 test-fuzz: setup ## build trees of mutated bytes under sanitizers, the same in every run
 	@cmake --preset sanitize --log-level=WARNING && cmake --build --preset sanitize --target fuzz_core
@@ -111,4 +111,4 @@ scenes: setup ## make the .blend files of blender_scenes/ anew
 	@$(BLENDER) --factory-startup --python-exit-code 1 --python blender_scenes/make_scenes.py -- $(ARGS)
 
 clean: ## remove what was built (not the .venv)
-	rm -rf build dist out
+	rm -rf build build-sanitize build-sanitize-thread dist out

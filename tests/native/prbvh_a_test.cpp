@@ -132,7 +132,7 @@ TEST(PrbvhA, IsValidOnEveryShapeOfInput) {
 
 TEST(PrbvhA, IsTheSameForAnyThreadCountAndAnotherForAnotherSeed) {
     const tbb::global_control more_than_cores(tbb::global_control::max_allowed_parallelism, 8);
-    const Mesh mesh = random_soup(5000);
+    const Mesh mesh = random_soup(4500);
     const AnnealingConfig config{.iterations = 80};
     const BinaryBvh one = with_threads(1, [&] { return build(mesh, config); });
     for (const int threads : {2, 7}) {
