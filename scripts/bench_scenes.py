@@ -26,15 +26,30 @@ PAPER_VIEWS = {
         ((0.46, 0.1, 0.33), (0.18, 0.14, 0.97)),
     ],
 }
+# Ours, in the same coordinates: rooms are seen from inside.
+OUR_VIEWS = {
+    "sibenik": [
+        ((0.12, 0.21, 0.1), (1.0, 0.0, 0.12)),
+        ((0.7, 0.28, 0.1), (-1.0, -0.3, 0.25)),
+        ((0.45, 0.12, 0.35), (0.5, 0.6, -0.35)),
+    ],
+    "bathroom": [
+        ((0.55, 0.4, 0.4), (-0.8, -0.4, -0.6)),
+        ((0.8, 0.3, 0.3), (-1.0, -0.3, -0.2)),
+        ((0.45, 0.3, 0.1), (-0.8, -0.35, 0.7)),
+    ],
+}
 FIELD_OF_VIEW = 45.0  # degrees, vertical
 
 
-def paper_camera(scene: Scene, name: str, position: Any, direction: Any) -> Camera:
-    """A camera of the paper: Y up, position in the normalised scene."""
+def normalised_camera(
+    scene: Scene, name: str, position: Any, direction: Any, up: tuple[float, float, float]
+) -> Camera:
+    """A camera as the paper describes it, position in the normalised scene."""
     used = scene.vertices[np.unique(scene.triangles)].astype(np.float64)
     lower, upper = used.min(axis=0), used.max(axis=0)
     backward = -np.asarray(direction) / np.linalg.norm(direction)
-    right = np.cross((0.0, 1.0, 0.0), backward)
+    right = np.cross(up, backward)
     right /= np.linalg.norm(right)
     to_world = np.eye(4)
     to_world[:3, :3] = np.stack((right, np.cross(backward, right), backward), axis=1)
@@ -44,11 +59,15 @@ def paper_camera(scene: Scene, name: str, position: Any, direction: Any) -> Came
 
 
 def load_scene(path: Path) -> Scene:
-    """The mesh with the paper's cameras, or with our own where it has none."""
-    scene = load_mesh_file(path, up="z" if path.stem in Z_UP else "y")
-    if path.stem in PAPER_VIEWS:
+    """The mesh with the paper's cameras, with ours inside a room, else with three from outside."""
+    z_up = path.stem in Z_UP
+    scene = load_mesh_file(path, up="z" if z_up else "y")
+    whose = "paper" if path.stem in PAPER_VIEWS else "inside"
+    if views := PAPER_VIEWS.get(path.stem) or OUR_VIEWS.get(path.stem):
         scene.cameras = [
-            paper_camera(scene, f"paper {i + 1}", *view)
-            for i, view in enumerate(PAPER_VIEWS[path.stem])
+            normalised_camera(
+                scene, f"{whose} {i + 1}", *view, (0.0, 0.0, 1.0) if z_up else (0.0, 1.0, 0.0)
+            )
+            for i, view in enumerate(views)
         ]
     return scene

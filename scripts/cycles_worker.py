@@ -21,6 +21,9 @@ import time
 from pathlib import Path
 from typing import Any
 
+ANSWERS = os.fdopen(os.dup(1), "w")  # Blender prints to stdout itself, also when it is imported
+os.dup2(2, 1)
+
 import bpy
 import numpy as np
 from blender_scene import open_for_render
@@ -84,8 +87,6 @@ def read_exr(path: str) -> np.ndarray:
 
 
 def main() -> int:
-    answers = os.fdopen(os.dup(1), "w")  # Blender prints to stdout itself
-    os.dup2(2, 1)
     settings = json.loads(sys.argv[2])
     open_for_render(
         Path(sys.argv[1]),
@@ -95,11 +96,11 @@ def main() -> int:
         settings["diffuse"],
     )
     set_up(settings)
-    print(json.dumps({"version": bpy.app.version_string}), file=answers, flush=True)
+    print(json.dumps({"version": bpy.app.version_string}), file=ANSWERS, flush=True)
     for line in sys.stdin:
         order = json.loads(line)
         seconds = render_picture(order["samples"], order["seed"], order.get("pixels", ""))
-        print(json.dumps({"seconds": seconds}), file=answers, flush=True)
+        print(json.dumps({"seconds": seconds}), file=ANSWERS, flush=True)
     return 0
 
 

@@ -29,6 +29,7 @@ from bvh_lab.study.arguments import add_plan_arguments, plan_from_arguments
 from bvh_lab.study.console import ProgressLine, duration, stdout_to_stderr
 from bvh_lab.study.core_scene import core_scene
 from bvh_lab.study.cost_points import correlations_text, cost_points, cost_points_csv
+from bvh_lab.study.devices import CPU, known_as, labels
 from bvh_lab.study.figures import (
     SceneViews,
     build_against_speed,
@@ -50,6 +51,9 @@ from bvh_lab.study.job import Job
 from bvh_lab.study.output import file_stems, write_text_aside
 from bvh_lab.study.paper_tables import (
     PAPER_KINDS,
+    Measured,
+    Table,
+    devices_of,
     measured_by,
     paper_tables,
     table_text,
@@ -250,27 +254,41 @@ def variant(name: str) -> tuple[str, int, str]:
 
 def write_study(studied: Sequence[Studied], out: Path) -> str:
     """All tables and figures over the scenes so far; gives the text of tables.txt."""
-    measured = measured_by([one.result for one in studied])
-    tables, points = paper_tables(measured), cost_points(measured)
-    texts = [table_text(table, measured) for table in tables]
-    if points:
-        texts.append(correlations_text(points))
-        cost_against_time(points, out / "figure1")
-        write_text_aside(out / "figure1.csv", cost_points_csv(points))
-    for kind in PAPER_KINDS:
-        if builds := build_points(measured, kind):
-            build_against_speed(builds, out / f"build_time_{kind}", kind)
-    sheet = [
-        SceneViews(one.result.subject.name, one.result.subject.triangles, one.views)
-        for one in studied
-        if one.views
-    ]
-    if sheet:
+    results = [one.result for one in studied]
+    devices = devices_of(results)
+    names = labels(devices)
+    stems = file_stems(names.values())
+    tables, texts = list[Table](), list[str]()
+    for device in devices:
+        measured = measured_by(results, device=device)
+        of_device = paper_tables(measured)
+        tables += of_device
+        if devices != [CPU]:
+            said = "" if of_device else ": nothing was measured"
+            texts.append(f"Device {known_as(device)}{said}\n")
+        texts += [table_text(table, measured) for table in of_device]
+        ending = "" if device == devices[0] else f"_{stems[names[device]]}"
+        texts += write_figures(measured, out, ending)
+    subjects = [(one.result.subject, one.views) for one in studied if one.views]
+    if subjects:
+        sheet = [SceneViews(subject.name, subject.triangles, views) for subject, views in subjects]
         contact_sheet(sheet, out / "figure2")
     text = "\n".join(texts)
     write_text_aside(out / "tables.txt", text)
     write_text_aside(out / "tables.csv", tables_csv(tables))
     return text
+
+
+def write_figures(measured: Measured, out: Path, ending: str) -> list[str]:
+    """Figure 1 and those of build times of a device; gives the text of the correlations."""
+    for kind in PAPER_KINDS:
+        if builds := build_points(measured, kind):
+            build_against_speed(builds, out / f"build_time_{kind}{ending}", kind)
+    if not (points := cost_points(measured)):
+        return []
+    cost_against_time(points, out / f"figure1{ending}")
+    write_text_aside(out / f"figure1{ending}.csv", cost_points_csv(points))
+    return [correlations_text(points)]
 
 
 def write_scene(one: Studied, stem: str, out: Path) -> str:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import re
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -12,6 +14,12 @@ CPU = "cpu"
 OPENCL = "opencl"  # the first OpenCL device that can be used, graphics cards before others
 
 Devices = Sequence[Mapping[str, Any]]  # as core.devices() gives them
+
+# What drivers say of a device beside its name: trademarks, brackets, clock rate, what it is.
+_BESIDE = re.compile(r"\([^)]*\)|[®™]| @ [\d.]+ ?[GM]Hz|\b(?:Processor|CPU)\b")
+_POCL = re.compile(r"opencl:Portable Computing Language/(\w+)-")  # then comes the processor's name
+_TWIN = re.compile(r"( #\d+)?$")  # the core numbers devices of one name
+LONGEST_NAME = 28  # characters of a device's name in a table
 
 
 def resolved(chosen: Sequence[str], devices: Devices) -> list[str]:
@@ -55,8 +63,20 @@ def has_tests(device: str, triangle_test: str, box_test: str) -> bool:
 
 
 def short_name(device: str) -> str:
-    """The device's own name, without the platform's."""
-    return device.partition("/")[2] or device
+    """What to call a device in tables and sentences; its id stands once beside them (`known_as`).
+
+    Its own name without the platform's, cut to `LONGEST_NAME`: "NVIDIA H100 80GB HBM3", and of PoCL
+    "PoCL pthread" rather than its processor's name.
+    """
+    named = device.partition("/")[2]
+    if not named:
+        return device
+    twin = _TWIN.search(named)
+    number = twin[0] if twin else ""
+    if pocl := _POCL.match(device):
+        return f"PoCL {pocl[1]}{number}"
+    bare = " ".join(_BESIDE.sub(" ", named.removesuffix(number)).split()) or named
+    return textwrap.shorten(bare, LONGEST_NAME, placeholder=" …") + number
 
 
 def labels(devices: Iterable[str]) -> dict[str, str]:
@@ -64,6 +84,12 @@ def labels(devices: Iterable[str]) -> dict[str, str]:
     ids = set(devices)
     names = [short_name(device) for device in ids]
     return {d: short_name(d) if names.count(short_name(d)) == 1 else d for d in ids}
+
+
+def known_as(device: str) -> str:
+    """What tables call the device, with its id where that is another: once above a table."""
+    name = short_name(device)
+    return device if name == device else f"{name} ({device})"
 
 
 def described(device: Mapping[str, Any]) -> str:

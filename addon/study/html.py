@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
-from .devices import CPU, described
+from .devices import CPU, described, labels
 from .method import method
 from .results import KINDS, Result, Row
 from .table import Column, columns, failures, fastest, header, picture_quality
@@ -223,8 +223,9 @@ def _facts(result: Result) -> str:
         "BVH Lab": machine.version,
         "Embree": machine.embree,
     }
+    names = labels(plan.devices)
     for device in machine.devices:
         if device["id"] in plan.devices and device["id"] != CPU:
-            facts[f"Device {device['id']}"] = described(device)
+            facts[f"Device {names[device['id']]}"] = f"{device['id']}: {described(device)}"
     listed = "\n".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in facts.items())
     return f"<dl>\n{listed}\n</dl>"

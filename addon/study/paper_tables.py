@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from .devices import CPU
 from .plan import BRANCHINGS, BUILDERS
 from .precision import CWBVH_BRANCHING, FULL, width_text
 from .results import KINDS, Result, spread
@@ -63,11 +64,15 @@ class Build:
 
 @dataclass
 class Measured:
-    """What the tables are made of; ``labels`` are the builders' names in the paper's spelling."""
+    """What the tables are made of, on one device.
+
+    ``labels`` are the builders' names in the paper's spelling.
+    """
 
     traces: list[Trace]
     builds: list[Build]
     labels: dict[str, str]
+    device: str = CPU
 
     @property
     def scenes(self) -> list[str]:
@@ -114,6 +119,7 @@ class Table:
     caption: str
     lines: list[Line]
     suffix: str = ""
+    device: str = CPU
 
     @property
     def name(self) -> str:
@@ -121,22 +127,31 @@ class Table:
         return f"{self.number}{self.suffix}"
 
 
-def measured_by(results: Sequence[Result], reorder: str = "aila") -> Measured:
-    """The measurements of our own rows in all results, one result for each scene.
+def devices_of(results: Sequence[Result]) -> list[str]:
+    """The ids of the devices that have rows of ours, in the order they come."""
+    rows = (row for result in results for row in result.rows)
+    return list(dict.fromkeys(row.device for row in rows if row.system == "bvh_lab"))
 
-    Of the rows with reordered rays those with the key ``reorder`` count, and of several devices the
-    first of each plan. Raises ValueError for two
-    results of one scene name.
+
+def measured_by(
+    results: Sequence[Result], reorder: str = "aila", device: str | None = None
+) -> Measured:
+    """The measurements of our own rows on one device in all results, one result for each scene.
+
+    Of the rows with reordered rays those with the key ``reorder`` count. ``device`` is of
+    `devices_of`, the first of them unless given. Raises ValueError for two results of one scene
+    name.
     """
     names = [result.subject.name for result in results]
     if len(set(names)) < len(names):
         raise ValueError(f"two results are of a scene of the same name: {', '.join(names)}")
-    made = Measured([], [], {})
+    device = device or next(iter(devices_of(results)), CPU)
+    made = Measured([], [], {}, device)
     for result in results:
         for row in result.rows:
             if not row.exact or row.error or row.tree is None:
                 continue
-            if row.device != result.plan.devices[0]:
+            if row.device != device:
                 continue
             made.labels[row.builder] = row.label
             if row.branching == 2 and row.reorder == "off" and (build := row.build()):
@@ -170,6 +185,8 @@ def paper_tables(measured: Measured) -> list[Table]:
     tables = [_relative_speeds(measured), _build_times(measured)]
     tables += [_cost_and_speed(measured, shape) for shape in WIDTHS]
     tables.append(_time_by_cost(measured))
+    for table in tables:
+        table.device = measured.device
     return [table for table in tables if any(line.cells for line in table.lines)]
 
 
@@ -377,10 +394,10 @@ def tables_csv(tables: Sequence[Table]) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     names = ("table", "scene", "branching", "layout", "statistic", "builder")
-    writer.writerow([*names, "value", "relative_to_lbvh", "spread_percent"])
+    writer.writerow([*names, "value", "relative_to_lbvh", "spread_percent", "device"])
     for table in tables:
         for line in table.lines:
             for builder, cell in line.cells.items():
                 place = (table.name, line.scene, line.branching, line.layout, line.statistic)
-                writer.writerow([*place, builder, *cell])
+                writer.writerow([*place, builder, *cell, table.device])
     return out.getvalue()

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from .accuracy import Errors
-from .devices import CPU, described, labels, short_name
+from .devices import CPU, described, known_as, labels, short_name
 from .method import method
 from .precision import BOX_TESTS, LAYOUTS, SHORT, TRIANGLE_TESTS, tests_in_words, width_text
 from .results import COUNTERS, KINDS, Result, Row, Spread, ratio
@@ -331,7 +331,7 @@ def header(result: Result) -> list[str]:
         *ray_counts(result),
         f"{machine.host} with BVH Lab {machine.version}; {machine.cpu}"
         + (f", {threads} threads." if threads else "."),
-        *(f"Device {device['id']}: {described(device)}." for device in devices),
+        *(f"Device {known_as(device['id'])}: {described(device)}." for device in devices),
     ]
 
 

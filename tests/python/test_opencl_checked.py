@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from bvh_lab.native import core
 
-OCLGRIND = shutil.which("oclgrind")
-LIBRARY = Path(OCLGRIND or "/usr/bin/oclgrind").resolve().parents[1] / "lib/oclgrind/liboclgrind-rt-icd.so"
+OCLGRIND = shutil.which("oclgrind") or "/usr/bin/oclgrind"
+LIBRARY = Path(OCLGRIND).resolve().parents[1] / "lib/oclgrind/liboclgrind-rt-icd.so"
 BUILDERS = [entry["id"] for entry in core.builders()]
 MADE_BY_THE_CPU = {"sah", "hybrid"}  # as sbvh, which stands for them: collapse and tracing
 

@@ -14,7 +14,7 @@ import pytest
 from bvh_lab import cli
 from bvh_lab.native import core
 from bvh_lab.study import run
-from bvh_lab.study.devices import labels, named, resolved, short_name
+from bvh_lab.study.devices import known_as, labels, named, resolved, short_name
 from bvh_lab.study.plan import Plan
 from bvh_lab.study.report import write_report
 from bvh_lab.study.results import KINDS, Result
@@ -78,6 +78,25 @@ def test_short_names_tell_devices_apart() -> None:
     assert labels(["opencl:a/x", "opencl:b/x"]) == {d: d for d in ("opencl:a/x", "opencl:b/x")}
 
 
+@pytest.mark.parametrize(
+    ("device", "name"),
+    [
+        ("Portable Computing Language/pthread-skylake-Intel(R) Xeon(R) @ 2.50GHz", "PoCL pthread"),
+        ("Portable Computing Language/cpu-znver3-AMD EPYC 7713 #2", "PoCL cpu #2"),
+        ("NVIDIA CUDA/NVIDIA H100 80GB HBM3", "NVIDIA H100 80GB HBM3"),
+        ("NVIDIA CUDA/NVIDIA H100 80GB HBM3 #3", "NVIDIA H100 80GB HBM3 #3"),
+        ("Intel(R) OpenCL/Intel(R) Core(TM) i7-8700 CPU @ 3.20GHz", "Intel Core i7-8700"),
+        ("Clover/AMD Radeon RX 6800 XT (navi21, LLVM 15, DRM 3.49)", "AMD Radeon RX 6800 XT"),
+        ("a/An accelerator whose name does not want to end", "An accelerator whose name …"),
+        ("a/(nothing else)", "(nothing else)"),
+    ],
+)
+def test_long_names_are_shortened_and_known_by_their_ids(device: str, name: str) -> None:
+    assert short_name(f"opencl:{device}") == name
+    assert known_as(f"opencl:{device}") == f"{name} (opencl:{device})"
+    assert known_as("cpu") == "cpu"
+
+
 # --- studies -------------------------------------------------------------------------------------
 
 
@@ -121,14 +140,16 @@ def test_every_device_has_the_same_rows_with_the_same_answers(study: Study) -> N
 def test_all_outputs_show_the_device(study: Study, tmp_path: Path) -> None:
     result, full = study.result, first_device()
     text = text_report(result)
-    assert f"Device {full}: " in text and "driver" in text
+    assert f"Device {known_as(full)}: " in text and "driver" in text
+    assert text.count(full) == 1  # else by its short name, so that tables stay narrow
     assert "by the device's own clock" in text
     assert "those of the cpu, byte for byte" in text
     assert f"{short_name(full)}'s differs from" in text or "cpu's, bit for bit" in text
     assert "SAH are made by the CPU core" in text
     assert Result.from_json(result.to_json()) == result
     write_report(result, {}, tmp_path / "report")
-    assert f"Device {full}" in (tmp_path / "report" / "index.html").read_text()
+    page = (tmp_path / "report" / "index.html").read_text()
+    assert f"<dt>Device {short_name(full)}</dt><dd>{full}: " in page
     for name in ("results.csv", "rays.csv"):
         lines = list(csv.DictReader(io.StringIO((tmp_path / "report" / name).read_text())))
         assert {line["device"] for line in lines} >= {"cpu", full}

@@ -18,6 +18,7 @@ from bvh_lab.study.paper_tables import (
     Measured,
     Table,
     Trace,
+    devices_of,
     measured_by,
     paper_tables,
     table_text,
@@ -31,14 +32,21 @@ PAPER = Path(__file__).resolve().parents[3] / "shared" / "paper"
 needs_paper = pytest.mark.skipif(not PAPER.is_dir(), reason=f"{PAPER} is not there")
 
 
-def row(builder: str, branching: int, reorder: str, cost: float, seconds: list[float]) -> Row:
+def row(
+    builder: str,
+    branching: int,
+    reorder: str,
+    cost: float,
+    seconds: list[float],
+    device: str = "cpu",
+) -> Row:
     """A row whose million secondary rays took ``seconds`` in the first view, twice that in the
     second; shadow rays took half."""
     tree = Tree(1, 1, 1, 1, 1, 1, 1.0, 1, cost)
     made = Row(
         f"{builder}_{branching}_{reorder}",
         builder.upper(),
-        *("bvh_lab", builder, branching, reorder, "cpu"),
+        *("bvh_lab", builder, branching, reorder, device),
         tree=tree,
         build_seconds=[0.001 * cost],
     )
@@ -183,6 +191,35 @@ def test_another_key_can_be_asked_for() -> None:
     rows[2].measurements = row("lbvh", 2, "", 9.0, [0.5]).measurements
     of = table(measured_by([result("hall", rows)], reorder="origin"), 1)
     assert line(of, 2, "shadow rays reordered").cells["lbvh"].value == pytest.approx(2.0)
+
+
+def test_each_device_has_tables_of_its_own() -> None:
+    rows = [
+        row(builder, 2, "off", cost, [slower * cost], device)
+        for device, slower in (("opencl:a/x", 1.0), ("cpu", 4.0))
+        for builder, cost in (("lbvh", 1.0), ("sah", 0.5))
+    ]
+    broken = row("lbvh", 2, "off", 9.0, [1.0], "opencl:a/gone")
+    broken.error = "device lost"
+    results = [result("hall", [*rows, broken]), result("hair", rows[:2])]
+    assert devices_of(results) == ["opencl:a/x", "cpu", "opencl:a/gone"]
+    assert measured_by(results).device == "opencl:a/x"
+    speeds = {}
+    for device in devices_of(results):
+        measured = measured_by(results, device=device)
+        tables = paper_tables(measured)
+        assert bool(tables) == (device != "opencl:a/gone")
+        for of in tables:
+            assert of.device == device
+            assert all(
+                cell["device"] == device
+                for cell in csv.DictReader([*tables_csv([of]).splitlines()])
+            )
+        if tables:
+            (three,) = (of for of in tables if of.number == 3)
+            speeds[device] = line(three, 2, "secondary rays", "hall").cells["sah"].value
+            assert len(measured.scenes) == (2 if device == "opencl:a/x" else 1)
+    assert speeds["opencl:a/x"] == pytest.approx(4.0 * speeds["cpu"])
 
 
 def test_without_lbvh_relative_cells_are_empty() -> None:
