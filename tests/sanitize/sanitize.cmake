@@ -18,16 +18,6 @@ if(has_avx2)
   add_compile_options(-march=haswell)
 endif()
 
-# Others' headers, compiled once. ccache can do so only if told that times do not matter.
-set(precompiled_headers <algorithm> <array> <atomic> <cmath> <filesystem> <functional> <memory>
-    <numeric> <random> <stdexcept> <string> <vector> <glm/glm.hpp> <tbb/blocked_range.h>
-    <tbb/enumerable_thread_specific.h> <tbb/parallel_for.h> <tbb/parallel_invoke.h>
-    <tbb/parallel_reduce.h> <tbb/task_arena.h>)
-add_compile_options(-Xclang -fno-pch-timestamp)
-if(CMAKE_CXX_COMPILER_LAUNCHER)
-  list(PREPEND CMAKE_CXX_COMPILER_LAUNCHER env CCACHE_SLOPPINESS=pch_defines,time_macros)
-endif()
-
 # The traversals take half of the whole time to compile: their local variables are not watched, nor
 # do those that are only there to be compared with guide the fuzzer. What they read and write is.
 if(BVHLAB_SANITIZE MATCHES "address")
