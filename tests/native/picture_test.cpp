@@ -141,7 +141,7 @@ TEST(Picture, IsTheSameBitForBitFromEveryTreeOrderThreadCountAndBatch) {
     Camera camera = from_above(0.5);
     camera.to_world = glm::translate(glm::dmat4(1.0), glm::dvec3(0.5, 0.5, 3));
     PictureOptions options{.samples = 3, .paths = {.depth = 3, .shadow_rays = 2}, .threads = 1};
-    const Picture expected = picture_of(tree_of(scene.mesh, "lbvh", 2), scene, camera, 28, options);
+    const Picture expected = picture_of(tree_of(scene.mesh, "lbvh", 2), scene, camera, 20, options);
     EXPECT_GT(mean(expected), 0.1);
     unsigned turn = 0;
     Token token;
@@ -153,7 +153,7 @@ TEST(Picture, IsTheSameBitForBitFromEveryTreeOrderThreadCountAndBatch) {
             options.batch = turn % 7 == 0 ? 1 : 100 << turn % 7;
             ++turn;
             const Bvh bvh = collapse(binary, scene.mesh, branching, {}, token);
-            const Picture picture = picture_of(bvh, scene, camera, 28, options);
+            const Picture picture = picture_of(bvh, scene, camera, 20, options);
             EXPECT_EQ(picture.film.pixels, expected.film.pixels) << info.id << branching;
             EXPECT_EQ(picture.rays, expected.rays);
         }
