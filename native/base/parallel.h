@@ -7,6 +7,7 @@
 #include <tbb/parallel_reduce.h>
 #include <tbb/partitioner.h>
 #include <tbb/task_arena.h>
+#include <tbb/task_group.h>
 
 #include <chrono>
 #include <cstddef>
@@ -34,6 +35,14 @@ decltype(auto) with_threads(int threads, Function&& function) {
     return arena.execute(call.task(std::forward<Function>(function)));
 }
 
+/// After a parallel call: once a task of the group that the caller runs in has thrown, oneTBB
+/// leaves the calls of its other tasks early and *without* an exception, so that results are
+/// missing. Throws Cancelled then, which goes no farther than the group: that passes on what was
+/// thrown first.
+inline void leave_cancelled_group() {
+    if (tbb::is_current_task_group_canceling()) throw Cancelled();
+}
+
 using IndexRange = tbb::blocked_range<std::size_t>;
 
 /// Calls `body(range)` for parts of [begin, end) of at most `grain` indices, a task each. The
@@ -44,6 +53,7 @@ void parallel_for_ranges(std::size_t begin, std::size_t end, std::size_t grain, 
     tbb::parallel_for(IndexRange(begin, end, grain),
                       call.task([&](const IndexRange& range) { body(range); }),
                       tbb::simple_partitioner());  // others make tasks far larger than the grain
+    leave_cancelled_group();
 }
 
 /// Calls `body(i)` for every i in [0, count), at most `grain` indices to a task, checking the token
@@ -63,19 +73,20 @@ template <class Sum, class Add>
 Sum parallel_sum(std::size_t begin, std::size_t end, std::size_t grain, const Sum& zero,
                  const Add& add) {
     const ForkJoin call;
-    return tbb::parallel_deterministic_reduce(
+    Sum sum = tbb::parallel_deterministic_reduce(
         IndexRange(begin, end, grain), zero,
-        call.task([&](const IndexRange& range, Sum sum) { return add(range, sum); }),
+        call.task([&](const IndexRange& range, Sum part) { return add(range, part); }),
         call.task([](Sum left, Sum right) { return left + right; }));
+    leave_cancelled_group();
+    return sum;
 }
 
-/// Calls both functions, which may run at the same time. Once another task has thrown, oneTBB
-/// leaves nested calls early and *without* an exception: check the token before the results are
-/// used.
+/// Calls both functions, which may run at the same time.
 template <class First, class Second>
 void parallel_invoke(const First& first, const Second& second) {
     const ForkJoin call;
     tbb::parallel_invoke(call.task([&] { first(); }), call.task([&] { second(); }));
+    leave_cancelled_group();
 }
 
 /// Wall-clock seconds since construction.

@@ -140,7 +140,6 @@ struct TopLevels {
             build_right();
         } else {
             parallel_invoke(build_left, build_right);
-            token.check();
         }
         bvh.children[node] = {left, right};
         bvh.boxes[node] = unite(bvh.boxes[left], bvh.boxes[right]);

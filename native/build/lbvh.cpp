@@ -47,7 +47,6 @@ std::uint32_t LbvhSubtrees::build(std::uint32_t node, std::uint32_t first,
         token.check();
         parallel_invoke([&] { left = build(node + 1, first, split); },
                         [&] { right = build(right_node, split + 1, last); });
-        token.check();
     }
     bvh.children[node] = {left, right};
     bvh.boxes[node] = unite(bvh.boxes[left], bvh.boxes[right]);

@@ -29,14 +29,16 @@ void require(bool holds, const char* what) {
     std::abort();
 }
 
-/// Every builder runs with small numbers of iterations and no limit of time, which depends on the
-/// machine.
+/// Every builder runs with small numbers of iterations and of references, and no limit of time,
+/// which depends on the machine.
 Parameters random_parameters(const BuilderInfo& builder, FuzzInput& input) {
     Parameters parameters;
     for (const ParameterInfo& info : builder.parameters) {
         if (info.name == "max_seconds") continue;
         const unsigned choice = input.byte(), step = input.byte();
-        const double most = info.name == "iterations" ? 40.0 : info.maximum;
+        const double most = info.name == "iterations"       ? 40.0
+                            : info.name == "max_references" ? 64.0
+                                                            : info.maximum;
         double value = std::min(info.default_value, most);
         if (choice % 4 == 1) value = std::min(info.minimum + step, most);
         if (choice % 4 == 2) value = info.minimum + (most - info.minimum) * (step / 255.0);
