@@ -222,7 +222,7 @@ def undo() -> None:
 def delete_scene() -> None:
     """As the button does, which first ends what renders it; a script would crash Blender here."""
     bpy.data.scenes.new("Other")
-    with bpy.context.temp_override(window=window()):  # waits for the thread's end: no gate here
+    with override(window=window()):
         bpy.ops.scene.delete()
 
 
@@ -238,7 +238,7 @@ def window_steps() -> Iterator[None]:
     bpy.ops.wm.window_new()
     second = bpy.context.window_manager.windows[1]
     yield from compare(second)
-    with bpy.context.temp_override(window=second):  # waits for the thread's end: no gate here
+    with override(window=second):
         bpy.ops.wm.window_close()
     for _ in range(5):
         yield

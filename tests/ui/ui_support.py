@@ -25,6 +25,9 @@ REST = _WORDS[2:]  # what a script has to do, where it can do several things
 
 TICK_SECONDS = 0.03
 PATIENCE_SECONDS = 120.0
+# Not for ever: operators that close a window or delete a scene wait for the thread's end. They
+# look members up before that, and after it.
+GATE_SECONDS = 5.0
 seen: dict[str, object] = {}
 
 
@@ -50,7 +53,7 @@ class Gate:
         def guarded(*arguments: object, **named: object) -> object:
             if threading.current_thread() is not threading.main_thread():
                 self._parked.add(threading.get_ident())
-                self._open.wait(5.0)  # not for ever: some operators wait for the thread's end
+                self._open.wait(GATE_SECONDS)
                 self._parked.discard(threading.get_ident())
             return function(*arguments, **named)
 
@@ -86,11 +89,13 @@ def override(**members: object) -> Iterator[None]:
     once, and Blender crashes in either. The add-on itself overrides no context.
     """
     if not _gates and "bvh_lab.native" in sys.modules:
+        from bvh_lab.blender import engine_final
         from bvh_lab.native import core
 
         gate = Gate()
         core.trace = gate.guard(core.trace)
         core.Renderer.render = gate.guard(core.Renderer.render)
+        engine_final.stopped = gate.guard(engine_final.stopped)  # Blender's render thread
         _gates.append(gate)
     if not _gates:
         with bpy.context.temp_override(**members):
