@@ -44,12 +44,12 @@ def by_choice(rows: Sequence[CaseRow]) -> dict[str, list[CaseRow]]:
         if row.variant.builder in EMBREE:
             name = row.variant.builder
         else:
-            name = tests_name(row.variant.precision)
+            name = pair_name(row.variant.precision)
         groups.setdefault(name, []).append(row)
     return groups
 
 
-def tests_name(precision: Precision) -> str:
+def pair_name(precision: Precision) -> str:
     return f"{precision.triangle_test}/{precision.box_test}"
 
 
@@ -73,47 +73,57 @@ def ulp_text(value: float) -> str:
     return f"{value:.2f}" if value < 100 else f"{value:.1e}"
 
 
+DEFAULT_HEAD = (
+    "default tests", "rays", "trees", "misses", "false hits", "wrong triangle", "by ulp",
+    "t ulp median", "99.9 %", "max", "well-cond.", "max, all", "u, v max", "differ",
+)  # fmt: skip
+
+
+def default_cells(rows: Sequence[CaseRow]) -> tuple[str, ...]:
+    """The line of one case under DEFAULT_HEAD: the worst of its trees."""
+    worst = {name: max(row.errors[name] for row in rows) for name in rows[0].errors}
+    return (
+        rows[0].case,
+        str(worst["judged"]),
+        str(len(rows)),
+        str(worst["false_misses"]),
+        str(worst["false_hits"] + worst["invalid"]),
+        str(worst["wrong_triangles"]),
+        ulp_text(worst["wrong_ulps"]),
+        *(ulp_text(worst[f"t_ulps_well_{name}"]) for name in ("median", "p999", "max")),
+        f"{100 * worst['well_conditioned'] / max(worst['answered'], 1):.0f}%",
+        ulp_text(worst["t_ulps_all_max"]),
+        f"{worst['uv_well_max']:.1e}",
+        str(max(row.disagreeing + row.any_hit_differs for row in rows)),
+    )
+
+
 def default_table(rows: Sequence[CaseRow]) -> list[str]:
     """Errors of the default tests on every case, over all of its trees."""
-    head = (
-        "default tests", "rays", "trees", "misses", "false hits", "wrong triangle", "by ulp",
-        "t ulp median", "99.9 %", "max", "well-cond.", "max, all", "u, v max", "differ",
-    )  # fmt: skip
-    lines = []
-    for case in dict.fromkeys(row.case for row in rows):
-        mine = [row for row in rows if row.case == case]
-        worst = {name: max(row.errors[name] for row in mine) for name in mine[0].errors}
-        lines.append(
-            (
-                case,
-                str(worst["judged"]),
-                str(len(mine)),
-                str(worst["false_misses"]),
-                str(worst["false_hits"] + worst["invalid"]),
-                str(worst["wrong_triangles"]),
-                ulp_text(worst["wrong_ulps"]),
-                *(ulp_text(worst[f"t_ulps_well_{name}"]) for name in ("median", "p999", "max")),
-                f"{100 * worst['well_conditioned'] / max(worst['answered'], 1):.0f}%",
-                ulp_text(worst["t_ulps_all_max"]),
-                f"{worst['uv_well_max']:.1e}",
-                str(max(row.disagreeing + row.any_hit_differs for row in mine)),
-            )
-        )
-    return table(head, lines)
+    return table(DEFAULT_HEAD, [default_cells(mine) for mine in _by_case(rows)])
+
+
+CHOICES_HEAD = "gaps, farther triangles"
+
+
+def choices_cells(rows: Sequence[CaseRow], names: Sequence[str]) -> tuple[str, ...]:
+    """The line of one case: worst shares of gaps and of farther triangles, by choice."""
+    groups = by_choice(rows)
+    shares = [worst_share(groups.get(name, [])) for name in names]
+    return rows[0].case, *(f"{share_text(gap)} {share_text(far)}" for gap, far in shares)
 
 
 def choices_table(rows: Sequence[CaseRow]) -> list[str]:
     """Shares of gaps and of farther triangles on the worst tree, by case and choice."""
     names = list(by_choice(rows))
-    lines = []
-    for case in dict.fromkeys(row.case for row in rows):
-        groups = by_choice([row for row in rows if row.case == case])
-        cells = []
-        for name in names:
-            gaps, triangles = worst_share(groups.get(name, []))
-            cells.append(f"{share_text(gaps)} {share_text(triangles)}")
-        lines.append((case, *cells))
-    return table(("gaps, farther triangles", *names), lines)
+    return table((CHOICES_HEAD, *names), [choices_cells(mine, names) for mine in _by_case(rows)])
+
+
+def _by_case(rows: Sequence[CaseRow]) -> list[list[CaseRow]]:
+    groups: dict[str, list[CaseRow]] = {}
+    for row in rows:
+        groups.setdefault(row.case, []).append(row)
+    return list(groups.values())
 
 
 def speed_table(rows: Sequence[SpeedRow]) -> list[str]:

@@ -2,12 +2,13 @@
 """Every builder, width and layout on every hard case (`make stability` runs them at full size).
 
 The default tests of `core.trace` have to be right; the other precision choices are compared with
-them elsewhere, wrong as they may be, but must answer.
+them elsewhere, wrong as they may be, but must answer. The errors of all are printed as tables.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,9 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "blender_scenes"), str(ROOT / "scripts")]
 
 from hard_cases import CASES, case_named
+from stability_cases import CaseRow, Variant
 from stability_measure import MISS, Judge, disagreeing, precision_choices, trees
+from stability_tables import CHOICES_HEAD, DEFAULT_HEAD, choices_cells, default_cells, pair_name
 
 TRACED = [case.name for case in CASES if not case.refused]
 REFUSED = [case.name for case in CASES if case.refused]
@@ -36,25 +39,35 @@ def judge_of(name: str) -> Judge:
 
 
 def all_trees(name: str) -> Any:
-    """(name, tree) of every builder, width and layout."""
+    """(variant, tree) of every builder, width and layout."""
     mesh = judge_of(name).mesh
     for builder in [entry["id"] for entry in core.builders()]:
         tree = core.build_tree(mesh, builder, params=fast_params(builder))
         for width, bvh in trees(core, tree):
-            yield f"{builder} {width}", bvh
+            yield Variant(builder, width), bvh
 
 
 @pytest.mark.parametrize("name", TRACED)
-def test_the_default_is_right_and_the_same_from_every_tree(name: str) -> None:
+def test_the_default_is_right_and_the_same_from_every_tree(
+    name: str, record_property: Callable[[str, object], None]
+) -> None:
     judge = judge_of(name)
     rays = judge.problem.rays()
-    first = None
-    for label, bvh in all_trees(name):
+    first, rows = None, []
+    for variant, bvh in all_trees(name):
         bvh.validate()
-        hits = core.trace(bvh, *rays)
+        hits, any_hit = core.trace(bvh, *rays), core.trace(bvh, *rays, any_hit=True)
         first = first or hits
-        assert disagreeing(first, hits) == 0, label
-        assert np.array_equal(core.trace(bvh, *rays, any_hit=True).occluded, hits.occluded), label
+        row = CaseRow(
+            name,
+            variant,
+            judge.errors(hits).summary,
+            disagreeing(first, hits),
+            int((any_hit.occluded != hits.occluded).sum()),
+        )
+        assert row.disagreeing == row.any_hit_differs == 0, variant
+        rows.append(row)
+    record_property("table", (DEFAULT_HEAD, default_cells(rows)))
     errors = judge.errors(first)
     assert errors.must_hit_missed == errors.must_miss_hit == 0
     assert errors.false_misses == errors.false_hits == errors.invalid == 0
@@ -66,17 +79,26 @@ def test_the_default_is_right_and_the_same_from_every_tree(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", TRACED)
-def test_other_precision_choices_answer(name: str) -> None:
+def test_other_precision_choices_answer(
+    name: str, record_property: Callable[[str, object], None]
+) -> None:
     """Right or wrong, but a miss, or a triangle at a distance within the interval."""
     judge = judge_of(name)
+    rays = judge.problem.rays()
     tree = core.build_tree(judge.mesh, "sbvh")
+    choices = precision_choices(core)[1:]
+    rows = []
     for width, bvh in list(trees(core, tree))[2:]:  # 8-wide, in every layout
-        for choice in precision_choices(core)[1:]:
-            label = f"{width} {choice}"
-            hits = core.trace(bvh, *judge.problem.rays(), **choice.arguments())
-            assert judge.errors(hits).invalid == 0, label
-            any_hit = core.trace(bvh, *judge.problem.rays(), any_hit=True, **choice.arguments())
-            assert any_hit.occluded.shape == hits.occluded.shape, label
+        for choice in choices:
+            variant = Variant("sbvh", width, choice)
+            hits = core.trace(bvh, *rays, **choice.arguments())
+            errors = judge.errors(hits)
+            assert errors.invalid == 0, variant
+            any_hit = core.trace(bvh, *rays, any_hit=True, **choice.arguments())
+            assert any_hit.occluded.shape == hits.occluded.shape, variant
+            rows.append(CaseRow(name, variant, errors.summary, 0, 0))
+    names = [pair_name(choice) for choice in choices]
+    record_property("table", ((CHOICES_HEAD, *names), choices_cells(rows, names)))
 
 
 @pytest.mark.parametrize("name", REFUSED)
