@@ -11,6 +11,11 @@ add_compile_options(${sanitize_flags} -fno-omit-frame-pointer -gline-tables-only
                     -fsanitize-ignorelist=${CMAKE_CURRENT_LIST_DIR}/ignore.txt)
 add_compile_definitions(BVHLAB_SANITIZE _GLIBCXX_ASSERTIONS)
 
+# Neither Ninja nor ccache sees that list change: what is compiled depends on a definition instead.
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_CURRENT_LIST_DIR}/ignore.txt)
+file(SHA256 ${CMAKE_CURRENT_LIST_DIR}/ignore.txt ignored)
+add_compile_definitions(BVHLAB_SANITIZE_IGNORES=\"${ignored}\")
+
 # One instruction set instead of all that Highway knows: a fourth of the time to compile.
 # Highway takes AVX2 only where AES is there too, else it emulates: neither quick nor what users run.
 file(STRINGS /proc/cpuinfo has_avx2 REGEX "aes.*avx2.*bmi2" LIMIT_COUNT 1)
