@@ -28,7 +28,7 @@ TEST(OpenClTraceShape, AllShapesGiveTheSameHits) {
         for (const std::string& layout : layouts) {
             const Bvh bvh = tree_of(binary, held, layout);
             const TraceShape shape = other_shape(layout);
-            for (const Rays& rays : {random_rays(3000, held->bounds, 33), awkward_rays(*held, 2),
+            for (const Rays& rays : {random_rays(3000, held->bounds, 33), awkward_rays(*held),
                                      aimed_rays(*held, 500)}) {
                 for (const bool any_hit : {false, true})
                     expect_the_cpus_hits(bvh, rays, {{.any_hit = any_hit}, 0, shape}, layout);

@@ -34,9 +34,14 @@ inline Rays random_rays(std::size_t count, const Box& bounds, std::uint32_t seed
     return rays;
 }
 
-/// Rays with zero, negative zero, tiny and huge components, from a corner of each of the first
-/// `triangles`, along faces.
-inline Rays awkward_rays(const Mesh& mesh, std::size_t triangles) {
+/// Rays with zero, negative zero, tiny and huge components, from a corner of each of the first two
+/// triangles (of the first under sanitizers), along faces.
+inline Rays awkward_rays(const Mesh& mesh) {
+#ifdef BVHLAB_SANITIZE
+    const std::size_t triangles = 1;
+#else
+    const std::size_t triangles = 2;
+#endif
     const float parts[] = {0.0F, -0.0F, 1.0F, -1.0F, 1e-42F, -1e-30F, 1e20F};
     Rays rays;
     for (std::size_t i = 0; i < mesh.size() && i < triangles; ++i)
