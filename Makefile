@@ -65,15 +65,15 @@ test-sanitize: setup ## the C++ tests under address, undefined behaviour and thr
 		cmake --preset $$preset --log-level=WARNING && cmake --build --preset $$preset && \
 		ctest --test-dir build-$$preset --parallel 2 --no-tests=error --output-on-failure --timeout 600 || exit 1; done
 
-test-fuzz: setup ## build trees of mutated bytes under sanitizers, the same in every run
+test-fuzz: setup ## build trees of mutated bytes under sanitizers for about a minute, the same in every run
 	@cmake --preset sanitize --log-level=WARNING && cmake --build --preset sanitize --target fuzz_core
 	@rm -rf out/fuzz/first && mkdir -p out/fuzz/first
-	@$(FUZZ_CORE) -seed=1 -runs=20000 -max_total_time=60 out/fuzz/first tests/fuzz/corpus/core >out/fuzz/core.log 2>&1 || \
+	@$(FUZZ_CORE) -seed=1 -runs=30000 -max_total_time=120 out/fuzz/first tests/fuzz/corpus/core >out/fuzz/core.log 2>&1 || \
 		{ tail -n 60 out/fuzz/core.log; echo "make test-fuzz: the bytes are in out/fuzz/"; exit 1; }
 	@echo "core: $$(tail -n 1 out/fuzz/core.log)"
 
-test-files: build ## read mutated files, the same in every run
-	@$(PYTHON) tests/fuzz/fuzz_files.py --runs 500 --seconds 20
+test-files: build ## read mutated files for about a minute, the same in every run
+	@$(PYTHON) tests/fuzz/fuzz_files.py --runs 2000 --seconds 20
 
 fuzz: build ## the same with new bytes, SECONDS_A_TARGET=60 for each target, SEED=number
 	@cmake --preset sanitize --log-level=WARNING && cmake --build --preset sanitize --target fuzz_core
