@@ -51,6 +51,9 @@ struct Slabs {
 /// overflow. In a scene smaller than 2^-100 the longest component is in [2^-60, 2^-59) instead, so
 /// that t is no denormal number. Small components may lose bits or vanish there; the exact decision
 /// is taken on the direction as given.
+///
+/// What runs for each ray or candidate is inlined by force: it is compiled for the instructions of
+/// each SIMD target then, not once for the oldest processor.
 struct BoxRay {
     glm::vec3 origin;
     glm::vec3 given_direction;
@@ -91,7 +94,7 @@ inline int exponent_of(double value) {
     return int(std::bit_cast<std::uint64_t>(value) >> 52) - 1023;
 }
 
-inline BoxRay::BoxRay(const Ray& ray, const Box& bounds)
+[[gnu::always_inline]] inline BoxRay::BoxRay(const Ray& ray, const Box& bounds)
     : origin(ray.origin), given_direction(ray.direction) {
     constexpr float u = 0x1p-24F;
 
@@ -139,7 +142,8 @@ inline BoxRay::BoxRay(const Ray& ray, const Box& bounds)
     }
 }
 
-inline PreparedRay::PreparedRay(const Ray& ray, const Box& bounds) : BoxRay(ray, bounds) {
+[[gnu::always_inline]] inline PreparedRay::PreparedRay(const Ray& ray, const Box& bounds)
+    : BoxRay(ray, bounds) {
     // Shear along the longest axis.
     const glm::vec3 magnitude = glm::abs(direction);
     kz = magnitude.x >= magnitude.y ? (magnitude.x >= magnitude.z ? 0 : 2)
@@ -160,7 +164,8 @@ inline PreparedRay::PreparedRay(const Ray& ray, const Box& bounds) : BoxRay(ray,
 
 /// Computed interval [near, far] in which the ray is inside a box; `planes` by row of
 /// WideNode::planes.
-inline void box_interval(const BoxRay& ray, const float (&planes)[6], float& near, float& far) {
+[[gnu::always_inline]] inline void box_interval(const BoxRay& ray, const float (&planes)[6],
+                                                float& near, float& far) {
     near = ray.t_min;
     far = ray.t_max;
     for (int axis = 0; axis < 3; ++axis) {
@@ -190,7 +195,8 @@ struct EdgeFunctions {
     }
 };
 
-inline EdgeFunctions edge_functions(const PreparedRay& ray, const float (&corners)[3][3]) {
+[[gnu::always_inline]] inline EdgeFunctions edge_functions(const PreparedRay& ray,
+                                                           const float (&corners)[3][3]) {
     EdgeFunctions edges;
     double x[3], y[3], farthest = 0.0, largest = 0.0;
     for (int corner = 0; corner < 3; ++corner) {
@@ -231,8 +237,9 @@ bool exact_plane_crossing(const PreparedRay& ray, const float (&corners)[3][3],
 
 /// The interval of the triangle's own box, in the arithmetic of the nodes' boxes; false where it is
 /// empty. It is within the ray's [t_min, t_max].
-inline bool own_interval(const PreparedRay& ray, const float (&corners)[3][3], float& near,
-                         float& far) {
+[[gnu::always_inline]] inline bool own_interval(const PreparedRay& ray,
+                                                const float (&corners)[3][3], float& near,
+                                                float& far) {
     float planes[6];
     for (int axis = 0; axis < 3; ++axis) {
         const float p = corners[0][axis], q = corners[1][axis], r = corners[2][axis];
@@ -254,8 +261,9 @@ inline bool own_interval(const PreparedRay& ray, const float (&corners)[3][3], f
 /// largest |z|. `doubt` is A times that, with 4 for 3. Where it does not tell t to a unit in the
 /// last place of float, or on which side of t_min or t_max, the crossing is computed without
 /// rounding errors. As that is slow, the box is asked before.
-inline bool meets_triangle(const PreparedRay& ray, const float (&corners)[3][3], float& t, float& u,
-                           float& v, float nearest = std::numeric_limits<float>::infinity()) {
+[[gnu::always_inline]] inline bool meets_triangle(
+    const PreparedRay& ray, const float (&corners)[3][3], float& t, float& u, float& v,
+    float nearest = std::numeric_limits<float>::infinity()) {
     EdgeFunctions edges = edge_functions(ray, corners);
     if (edges.pass_by()) return false;
     float near, far;
