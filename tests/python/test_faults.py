@@ -142,7 +142,8 @@ def test_pictures_that_cannot_be_written_are_os_errors(tmp_path: Path) -> None:
 # A shell without a terminal lets what it starts in the background ignore SIGINT.
 HEARS_SIGINT = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
 
-# Says when it has written half of the report, and waits there.
+# Says when it has written half of the report, and waits there; in short sleeps, as a signal just
+# before one begins is seen after it only.
 HALF_WRITTEN = """
 import sys, time
 import bvh_lab.cli as cli
@@ -151,7 +152,8 @@ def fill_half(result, pictures, folder):
     fill(result, pictures, folder)
     (folder / "results.json").write_text("half")
     print("half written", flush=True)
-    time.sleep(60)
+    for _ in range(600):
+        time.sleep(0.1)
 cli.fill_report = fill_half
 sys.exit(cli.main(sys.argv[1:]))
 """
@@ -162,7 +164,8 @@ import sys, time
 import bvh_lab.cli as cli
 def read(path, up):
     print("reading", flush=True)
-    time.sleep(60)
+    for _ in range(600):
+        time.sleep(0.1)
 cli.load_mesh_file = read
 sys.exit(cli.main(sys.argv[1:]))
 """
