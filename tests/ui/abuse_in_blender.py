@@ -222,7 +222,7 @@ def undo() -> None:
 def delete_scene() -> None:
     """As the button does, which first ends what renders it; a script would crash Blender here."""
     bpy.data.scenes.new("Other")
-    with override(window=window()):
+    with bpy.context.temp_override(window=window()):  # waits for the thread's end: no gate here
         bpy.ops.scene.delete()
 
 

@@ -25,8 +25,7 @@ REST = _WORDS[2:]  # what a script has to do, where it can do several things
 
 TICK_SECONDS = 0.03
 PATIENCE_SECONDS = 120.0
-# Not for ever: operators that close a window or delete a scene wait for the thread's end. They
-# look members up before that, and after it.
+# Not for ever: closing a window waits for the study's end. It looks members up before and after.
 GATE_SECONDS = 5.0
 seen: dict[str, object] = {}
 
@@ -89,13 +88,11 @@ def override(**members: object) -> Iterator[None]:
     once, and Blender crashes in either. The add-on itself overrides no context.
     """
     if not _gates and "bvh_lab.native" in sys.modules:
-        from bvh_lab.blender import engine_final
         from bvh_lab.native import core
 
         gate = Gate()
         core.trace = gate.guard(core.trace)
         core.Renderer.render = gate.guard(core.Renderer.render)
-        engine_final.stopped = gate.guard(engine_final.stopped)  # Blender's render thread
         _gates.append(gate)
     if not _gates:
         with bpy.context.temp_override(**members):
