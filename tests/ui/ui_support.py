@@ -105,7 +105,15 @@ def override(**members: object) -> Iterator[None]:
 def screenshot(name: str) -> Iterator[None]:
     for _ in range(8):  # let the window be drawn
         yield
-    bpy.ops.screen.screenshot(filepath=str(OUT / name))
+    end = time.monotonic() + PATIENCE_SECONDS
+    while True:
+        try:
+            bpy.ops.screen.screenshot(filepath=str(OUT / name))
+            break
+        except RuntimeError as error:  # a render that is just ending holds the data for a moment
+            if "drawing/rendering" not in str(error) or time.monotonic() > end:
+                raise
+        yield
     yield
 
 
